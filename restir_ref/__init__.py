@@ -1,0 +1,33 @@
+"""Resampled importance sampling in light transport, written to be read with the papers.
+
+One idea: *an image is many integrals that can share samples*.  Read the modules in this order:
+`batch`, `chance`, `integrals`, `mis`, `resampling`, `restir`, then `gradient`, `decorrelation`
+and `oracle`.  The keys in square brackets, such as [GRIS Eq. 36], are explained in
+`docs/references.md`, the symbols in `docs/notation.md`.
+"""
+
+from restir_ref.chance import Chance, Live
+from restir_ref.integrals import Integrals, Pixels, Reservoirs, Shifted
+from restir_ref.mis import WEIGHTS, Weights
+from restir_ref.resampling import Input, gris, select, weigh
+from restir_ref.restir import initial, reuse_all, shade, spatial, temporal
+
+__all__ = [
+    "WEIGHTS",
+    "Chance",
+    "Input",
+    "Integrals",
+    "Live",
+    "Pixels",
+    "Reservoirs",
+    "Shifted",
+    "Weights",
+    "gris",
+    "initial",
+    "reuse_all",
+    "select",
+    "shade",
+    "spatial",
+    "temporal",
+    "weigh",
+]

@@ -1,0 +1,75 @@
+"""Structs of arrays: a batch is an array, or a (nested) frozen dataclass or tuple of arrays.
+
+Every leaf ends in the batch axis, so a scalar per sample has shape (N,), a point (d, N) and a
+spectrum (C, N).  Scalars per sample then broadcast against vectors without `[:, None]`, and sums
+over the small leading axes stay fast.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields, is_dataclass
+from functools import reduce
+from operator import add
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+Batch = TypeVar("Batch")
+
+
+def map_leaves(f: Callable[..., Array], *batches: Batch) -> Batch:
+    """Apply `f` to corresponding leaves of batches of one structure; `None` leaves stay `None`.
+
+    Raises TypeError for a leaf that is neither an array, a tuple nor a dataclass of them.
+    """
+    first: Any = batches[0]
+    if first is None or isinstance(first, np.ndarray):
+        return first if first is None else f(*batches)
+    if isinstance(first, tuple):
+        return type(first)(map_leaves(f, *parts) for parts in zip(*batches, strict=True))  # type: ignore[arg-type, call-arg, return-value]
+    if is_dataclass(first):
+        names = [field.name for field in fields(first)]
+        parts = {name: map_leaves(f, *(getattr(b, name) for b in batches)) for name in names}
+        return type(first)(**parts)
+    raise TypeError(f"a batch holds arrays, tuples or dataclasses of arrays, not {type(first).__name__}: {first!r}")
+
+
+def take(batch: Batch, index: Array) -> Batch:
+    """Gather columns `index` (N,) of every leaf.
+
+    `ndarray.take` keeps C order; `leaf[:, index]` would return Fortran order and silently turn
+    the struct of arrays into an array of structs, which slows down everything after it.
+    """
+    return map_leaves(lambda leaf: leaf.take(index, axis=-1), batch)
+
+
+def where(mask: Array, a: Batch, b: Batch) -> Batch:
+    """Column n of `a` where mask[n], else of `b`; mask (N,)."""
+    return map_leaves(lambda x, y: np.where(mask, x, y), a, b)
+
+
+def pick(batches: Sequence[Batch], s: Array) -> Batch:
+    """Column n of batches[s[n]]; s (N,) integers below len(batches)."""
+    chosen = [s == k for k in range(1, len(batches))]
+
+    def picked(*leaves: Array) -> Array:
+        out = np.array(np.broadcast_to(leaves[0], (*leaves[0].shape[:-1], len(s))))
+        for leaf, mask in zip(leaves[1:], chosen, strict=True):
+            np.copyto(out, leaf, where=mask)
+        return out
+
+    return batches[0] if not chosen else map_leaves(picked, *batches)
+
+
+def ratio(a: Array, b: Array) -> Array:
+    """a / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples."""
+    defined = np.not_equal(b, 0)
+    if defined.all():
+        return np.asarray(a / b)
+    return np.asarray(np.where(defined, a, 0) / np.where(defined, b, 1))
+
+
+def total(terms: Sequence[Array]) -> Array:
+    """Sum of at least one array, added left to right without a zero to start from."""
+    return reduce(add, terms)

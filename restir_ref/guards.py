@@ -1,0 +1,30 @@
+"""Checks of what users hand in; a failure names the value, its place and the remedy."""
+
+import numpy as np
+
+from restir_ref.batch import Array
+
+
+def nonnegative(values: Array, what: str, remedy: str) -> Array:
+    """Return `values` (..., N) if all are finite and >= 0.
+
+    Raises ValueError naming the first offending value and its column.
+    """
+    if values.dtype == object or not values.size or (values.min() >= 0 and values.max() < np.inf):
+        return values
+    bad = ~((values >= 0) & (values < np.inf))
+    where = tuple(int(k) for k in np.argwhere(bad)[0])
+    raise ValueError(
+        f"{what} must be finite and non-negative, but is {values[where]!s} in column {where[-1]} "
+        f"({int(bad.sum())} of {values.size} values are bad). {remedy}"
+    )
+
+
+def per_column(values: Array, n: int, what: str) -> Array:
+    """Return `values` if its last axis has n columns (or 1, or none, to broadcast).
+
+    Raises ValueError naming both shapes.
+    """
+    if values.ndim == 0 or values.shape[-1] in (1, n):
+        return values
+    raise ValueError(f"{what} has shape {values.shape}, but this batch has {n} columns: the last axis must be {n}.")

@@ -1,0 +1,133 @@
+"""Resampled importance sampling: weigh the inputs, select one.  [GRIS 4-5]
+
+RIS and GRIS are the same lines: `select` does not know whether its candidates come from a sampler
+(initial candidates, W = 1/p) or, shifted, from other pixels and frames (`weigh`).
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from restir_ref.batch import Array, pick, ratio, total
+from restir_ref.chance import Chance
+from restir_ref.guards import nonnegative, per_column
+from restir_ref.integrals import Pixels, Reservoirs, Sample, Shifted, p_hat_from, target
+from restir_ref.mis import CANONICAL_COVERS, Confidences, Density, Weights
+
+LARGEST_CONFIDENCE = 2.0**100
+"""Merged confidences saturate here, so that uncapped ones, which double every frame, stay finite."""
+
+ONE = np.array(1)
+"""The Jacobian of the identity."""
+
+
+@dataclass(frozen=True, eq=False)
+class Input:
+    """One input of a pass: reservoirs X whose samples live in the domains `at`."""
+
+    X: Reservoirs
+    at: Pixels
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A sample y where we select, p_hat(y), m W (with J), and c_i/m_i (None if 1); each (N,)."""
+
+    x: Sample
+    p_hat: Array
+    mW: Array
+    c_over_m: Array | None = None
+
+
+def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candidate]:
+    """Yield Y_i = T_i(X_i) with m_i(Y_i) W_i J_i for every input.  [GRIS Eq. 19]
+
+    Inputs whose `at` *is* `here` are canonical: same domain, identity shift.
+    Raises ValueError for no inputs, unequal batches, bad W or c, or no canonical input where
+    the weights need one.
+    """
+    c = _confidences(inputs, here, mis)
+    for i, source in enumerate(inputs):
+        y = _shifted(source, here)
+        q = _densities(i, y, inputs, here)
+        m = mis.m(i, q, c)
+        c_over_m = None if mis.c is None else ratio(mis.c(i, q, c), m)
+        yield Candidate(y.x, q(-1), m * source.X.W * y.J, c_over_m)
+
+
+def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservoirs:
+    """Choose Y in proportion to w_i = p_hat(Y_i) m_i W_i; W_Y = (c_s/m_s) sum_j w_j / p_hat(Y).  [GRIS Eq. 21, 22]
+
+    Where all w_i are 0 the result is a null sample: the first candidate with W = 0, and the
+    confidence c (N,) all the same.  Raises ValueError for no candidates or negative, NaN or
+    infinite weights.
+    """
+    offered = list(candidates)
+    if not offered:
+        raise ValueError("resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input.")
+    w = np.stack(np.broadcast_arrays(*(each.p_hat * each.mW for each in offered)))
+    nonnegative(w, "a resampling weight w_i = p_hat m_i W_i", "Check the m W of the candidates and the MIS weights m_i.")
+    s = chance.choose(w)
+    W = ratio(w.sum(axis=0), pick([each.p_hat for each in offered], s))
+    corrections = [each.c_over_m for each in offered if each.c_over_m is not None]
+    if corrections:
+        W = W * pick(corrections, s)
+    return Reservoirs(pick([each.x for each in offered], s), W, np.broadcast_to(c, W.shape))
+
+
+def gris(inputs: Sequence[Input], here: Pixels, mis: Weights, chance: Chance) -> Reservoirs:
+    """One pass of generalised RIS: weigh, then select; confidences add up.  [GRIS Eq. 19-22, 6.2]"""
+    chosen = list(weigh(inputs, here, mis))
+    return select(chosen, chance, np.minimum(total([each.X.c for each in inputs]), LARGEST_CONFIDENCE))
+
+
+def _shifted(source: Input, here: Pixels) -> Shifted:
+    """Y_i = T_i(X_i); the identity for canonical inputs."""
+    if source.at is here:
+        return Shifted(source.X.x, ONE)
+    return source.at.of.shift(source.X.x, source.at.index, here)
+
+
+def _densities(i: int, y: Shifted, inputs: Sequence[Input], here: Pixels) -> Density:
+    """q(j) = p_hat_from_j(Y_i), computed when first asked for; q(-1) = p_hat(Y_i).
+
+    The own density needs no shift back: T_i^-1(Y_i) = X_i and |dT_i^-1| = 1 / J_i.
+    """
+
+    @cache
+    def q(j: int) -> Array:
+        if j == -1:
+            return target(here, y.x)
+        if inputs[j].at is here:
+            return q(-1)
+        if j == i:
+            return ratio(target(inputs[i].at, inputs[i].X.x), y.J)
+        return p_hat_from(inputs[j].at, y.x, here)
+
+    return q
+
+
+def _confidences(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Confidences:
+    """The inputs' confidences, after checking everything about the inputs that can be checked."""
+    if not inputs:
+        raise ValueError("a pass needs at least one input (M = 0): pass the pixel's own reservoirs.")
+    for i, source in enumerate(inputs):
+        _check_input(source, len(here.index), f"input {i}")
+    canonical = [i for i, source in enumerate(inputs) if source.at is here]
+    c = Confidences([source.X.c for source in inputs], canonical)
+    if mis.unbiased_for == CANONICAL_COVERS and not (canonical and np.all(c.C_R > 0)):
+        raise ValueError(
+            "pairwise weights need a canonical input of positive confidence in every column (|R| = 0): "
+            "pass one whose `at` is the very Pixels object of the pass, and keep the confidence of null samples."
+        )
+    return c
+
+
+def _check_input(source: Input, n: int, name: str) -> None:
+    if len(source.at.index) != n:
+        raise ValueError(f"{name} has {len(source.at.index)} columns, but this pass has {n}: take() the right ones first.")
+    for what, values in (("weight W", source.X.W), ("confidence c", source.X.c)):
+        per_column(values, n, f"the {what} of {name}")
+        nonnegative(values, f"the {what} of {name}", "W comes from 1/p or from a pass, c counts samples.")

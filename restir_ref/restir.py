@@ -1,0 +1,92 @@
+"""ReSTIR as chained GRIS: initial candidates, temporal reuse, spatial reuse, shading.  [GRIS 6.3]
+
+Which previous pixel and which neighbours to use is a function of pixels and G-buffers, never of
+samples.  A loop is written by its caller from these passes: a renderer steps one history,
+positivization two.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from restir_ref.batch import Array, take, total
+from restir_ref.chance import Chance
+from restir_ref.integrals import Pixels, Reservoirs, Sample, target
+from restir_ref.mis import WEIGHTS, Weights
+from restir_ref.resampling import Candidate, Input, gris, select, weigh
+
+M_CAP = 20
+"""Default cap M_c on the confidence of history.  [GRIS 8.3]"""
+
+
+def initial(here: Pixels, chance: Chance) -> Reservoirs:
+    """Resample each column's initial candidates into one sample of confidence 1.  [GRIS Eq. 5-6; 6.3 step 1]"""
+    return resample(here.of.candidates(here.index, chance), here, chance)
+
+
+def resample(drawn: Iterable[tuple[Sample, Array]], here: Pixels, chance: Chance) -> Reservoirs:
+    """RIS over candidates (x, m W), W = 1/p; list them first to share them between integrals."""
+    offered = (Candidate(x, target(here, x), mW) for x, mW in drawn)
+    return select(offered, chance, np.ones(len(here.index), dtype=int))
+
+
+def temporal(
+    X: Reservoirs,
+    here: Pixels,
+    Y: Reservoirs,
+    before: Sequence[Pixels],
+    chance: Chance,
+    *,
+    mis: Weights = WEIGHTS["talbot"],
+    cap: float = M_CAP,
+) -> Reservoirs:
+    """Resample new samples X with the history Y of the previous frame.  [GRIS 6.3 step 2, 6.4]
+
+    Y holds the whole previous frame; each of `before` names one source column per pixel (motion
+    vectors), in the previous frame's integrals.  The confidence of history is capped on entry:
+    c <- min(c, cap).
+    """
+    history = [Input(capped(take(Y, source.index), cap), source) for source in before]
+    return gris([Input(X, here), *history], here, mis, chance)
+
+
+def spatial(
+    X: Reservoirs,
+    here: Pixels,
+    neighbours: Sequence[Pixels],
+    chance: Chance,
+    *,
+    mis: Weights = WEIGHTS["defensive"],
+) -> Reservoirs:
+    """Resample every pixel's reservoir with those of its neighbours, all of the same frame X.  [GRIS 6.3 step 3]"""
+    return gris([Input(X, here), *around(X, neighbours)], here, mis, chance)
+
+
+def reuse_all(
+    X: Reservoirs,
+    here: Pixels,
+    neighbours: Sequence[Pixels],
+    *,
+    mis: Weights = WEIGHTS["talbot"],
+) -> Array:
+    """sum_i f(Y_i) m_i W_i J_i: shift all, select none; (C, N).  [Bekaert 2002], by GRIS' weights."""
+    inputs = [Input(X, here), *around(X, neighbours)]
+    return total([here.of.contribution(here.index, y.x) * y.mW for y in weigh(inputs, here, mis)])
+
+
+def shade(X: Reservoirs, here: Pixels) -> Array:
+    """<I> = f(X) W, shape (C, N).  [GRIS Eq. 3; 6.3 step 4]"""
+    return here.of.contribution(here.index, X.x) * X.W
+
+
+def capped(X: Reservoirs, cap: float) -> Reservoirs:
+    """Confidence c <- min(c, M_c); needs cap > 0, for a null confidence is biased.  [GRIS 6.4]"""
+    if not cap > 0:
+        raise ValueError(f"the confidence cap M_c must be positive, but is {cap!r}; leave temporal reuse out instead.")
+    return replace(X, c=np.minimum(X.c, cap))
+
+
+def around(X: Reservoirs, neighbours: Sequence[Pixels]) -> list[Input]:
+    """The neighbours' reservoirs as inputs of a pass."""
+    return [Input(take(X, near.index), near) for near in neighbours]
