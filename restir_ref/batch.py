@@ -18,21 +18,24 @@ Array = NDArray[Any]
 Batch = TypeVar("Batch")
 
 
-def map_leaves(f: Callable[..., Array], *batches: Batch) -> Batch:
+def map_leaves(f: Callable[..., Any], *batches: Any) -> Any:
     """Apply `f` to corresponding leaves of batches of one structure; `None` leaves stay `None`.
 
     Raises TypeError for a leaf that is neither an array, a tuple nor a dataclass of them.
     """
-    first: Any = batches[0]
-    if first is None or isinstance(first, np.ndarray):
-        return first if first is None else f(*batches)
+    first = batches[0]
+    if first is None:
+        return None
+    if isinstance(first, np.ndarray):
+        return f(*batches)
     if isinstance(first, tuple):
-        return type(first)(map_leaves(f, *parts) for parts in zip(*batches, strict=True))  # type: ignore[arg-type, call-arg, return-value]
-    if is_dataclass(first):
-        names = [field.name for field in fields(first)]
-        parts = {name: map_leaves(f, *(getattr(b, name) for b in batches)) for name in names}
-        return type(first)(**parts)
-    raise TypeError(f"a batch holds arrays, tuples or dataclasses of arrays, not {type(first).__name__}: {first!r}")
+        return tuple(map_leaves(f, *parts) for parts in zip(*batches, strict=True))
+    if is_dataclass(first) and not isinstance(first, type):
+        parts = {each.name: [getattr(b, each.name) for b in batches] for each in fields(first)}
+        return type(first)(**{name: map_leaves(f, *leaves) for name, leaves in parts.items()})
+    raise TypeError(
+        f"a batch holds arrays, tuples or dataclasses of arrays, not {type(first).__name__}: {first!r}"
+    )
 
 
 def take(batch: Batch, index: Array) -> Batch:
@@ -41,12 +44,14 @@ def take(batch: Batch, index: Array) -> Batch:
     `ndarray.take` keeps C order; `leaf[:, index]` would return Fortran order and silently turn
     the struct of arrays into an array of structs, which slows down everything after it.
     """
-    return map_leaves(lambda leaf: leaf.take(index, axis=-1), batch)
+    gathered: Batch = map_leaves(lambda leaf: leaf.take(index, axis=-1), batch)
+    return gathered
 
 
 def where(mask: Array, a: Batch, b: Batch) -> Batch:
     """Column n of `a` where mask[n], else of `b`; mask (N,)."""
-    return map_leaves(lambda x, y: np.where(mask, x, y), a, b)
+    merged: Batch = map_leaves(lambda x, y: np.where(mask, x, y), a, b)
+    return merged
 
 
 def pick(batches: Sequence[Batch], s: Array) -> Batch:
@@ -59,11 +64,12 @@ def pick(batches: Sequence[Batch], s: Array) -> Batch:
             np.copyto(out, leaf, where=mask)
         return out
 
-    return batches[0] if not chosen else map_leaves(picked, *batches)
+    merged: Batch = map_leaves(picked, *batches)
+    return merged
 
 
 def ratio(a: Array, b: Array) -> Array:
-    """a / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples."""
+    """A / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples."""
     defined = np.not_equal(b, 0)
     if defined.all():
         return np.asarray(a / b)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio, where
+from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
 from restir_ref.integrals import Integrals, Pixels, Sample, Shifted, target
 
@@ -43,14 +43,14 @@ class Pairs:
 
     def target(self, index: Array, x: Based) -> Array:
         """p_hat = max(+-w* G, 0).  [GPT Eq. 26]"""
-        return np.maximum(self.sign * self._difference(index, x), 0)
+        return np.asarray(np.maximum(self.sign * self._difference(index, x), 0))
 
     def contribution(self, index: Array, x: Based) -> Array:
         """w* G where it has this sign, shape (1, N).  [GPT Eq. 24]"""
-        return self.sign * self.target(index, x)[None]
+        return np.asarray(self.sign * self.target(index, x)[None])
 
     def shift(self, x: Based, index: Array, to: Pixels) -> Shifted:
-        """Outer shift: the base path moves from i to i' or from j to j', k is kept; J* = J_tau.  [GPT Eq. 21, 22]"""
+        """Outer shift: the base path moves from i to i' or j to j'; k stays; J* = J_tau.  [GPT Eq. 21-22]"""
         there: Pairs = to.of  # type: ignore[assignment]
         outer = self.of.shift(x.x, self._side(index, x.k), Pixels(there.of, there._side(to.index, x.k)))
         return Shifted(Based(outer.x, x.k), outer.J)

@@ -27,7 +27,7 @@ class Integrals(Protocol):
         """
 
     def target(self, index: Array, x: Sample) -> Array:
-        """p_hat_i(x) >= 0, shape (N,); reads x and never traces again.  Law: supp p_hat is inside supp X."""
+        """p_hat_i(x) >= 0, (N,); reads x, never traces again.  Law: supp p_hat inside supp X."""
 
     def contribution(self, index: Array, x: Sample) -> Array:
         """f_i(x), shape (C, N)."""
@@ -67,7 +67,9 @@ class Reservoirs:
 def target(at: Pixels, x: Sample) -> Array:
     """p_hat(x) of the integrals `at`, checked: (N,), finite and >= 0."""
     p_hat = per_column(at.of.target(at.index, x), len(at.index), "the target p_hat")
-    return nonnegative(p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target().")
+    return nonnegative(
+        p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target()."
+    )
 
 
 def p_hat_from(j: Pixels, y: Sample, here: Pixels) -> Array:

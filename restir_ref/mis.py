@@ -100,7 +100,7 @@ def defensive(i: int, q: Density, c: Confidences) -> Array:
 
 def _pair(j: int, q: Density, c: Confidences) -> Array:
     """D_j = C_R p_hat + C_N q_j."""
-    return c.C_R * q(c.canonical[0]) + c.C_N * q(j)
+    return np.asarray(c.C_R * q(c.canonical[0]) + c.C_N * q(j))
 
 
 def _canonical_share(q: Density, c: Confidences) -> Array:

@@ -58,7 +58,7 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
 
 
 def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservoirs:
-    """Choose Y in proportion to w_i = p_hat(Y_i) m_i W_i; W_Y = (c_s/m_s) sum_j w_j / p_hat(Y).  [GRIS Eq. 21, 22]
+    """Choose Y by w_i = p_hat(Y_i) m_i W_i; W_Y = (c_s/m_s) sum_j w_j / p_hat(Y).  [GRIS Eq. 21-22]
 
     Where all w_i are 0 the result is a null sample: the first candidate with W = 0, and the
     confidence c (N,) all the same.  Raises ValueError for no candidates or negative, NaN or
@@ -66,9 +66,15 @@ def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservo
     """
     offered = list(candidates)
     if not offered:
-        raise ValueError("resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input.")
+        raise ValueError(
+            "resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input."
+        )
     w = np.stack(np.broadcast_arrays(*(each.p_hat * each.mW for each in offered)))
-    nonnegative(w, "a resampling weight w_i = p_hat m_i W_i", "Check the m W of the candidates and the MIS weights m_i.")
+    nonnegative(
+        w,
+        "a resampling weight w_i = p_hat m_i W_i",
+        "Check the m W of the candidates and the MIS weights m_i.",
+    )
     s = chance.choose(w)
     W = ratio(w.sum(axis=0), pick([each.p_hat for each in offered], s))
     corrections = [each.c_over_m for each in offered if each.c_over_m is not None]
@@ -120,14 +126,16 @@ def _confidences(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Confide
     if mis.unbiased_for == CANONICAL_COVERS and not (canonical and np.all(c.C_R > 0)):
         raise ValueError(
             "pairwise weights need a canonical input of positive confidence in every column (|R| = 0): "
-            "pass one whose `at` is the very Pixels object of the pass, and keep the confidence of null samples."
+            "pass one whose `at` is the Pixels object of the pass, and keep the confidence of null samples."
         )
     return c
 
 
 def _check_input(source: Input, n: int, name: str) -> None:
     if len(source.at.index) != n:
-        raise ValueError(f"{name} has {len(source.at.index)} columns, but this pass has {n}: take() the right ones first.")
+        raise ValueError(
+            f"{name} has {len(source.at.index)} columns, but this pass has {n}: take() the right ones first."
+        )
     for what, values in (("weight W", source.X.W), ("confidence c", source.X.c)):
         per_column(values, n, f"the {what} of {name}")
         nonnegative(values, f"the {what} of {name}", "W comes from 1/p or from a pass, c counts samples.")

@@ -21,7 +21,7 @@ M_CAP = 20
 
 
 def initial(here: Pixels, chance: Chance) -> Reservoirs:
-    """Resample each column's initial candidates into one sample of confidence 1.  [GRIS Eq. 5-6; 6.3 step 1]"""
+    """Resample the initial candidates into one sample of confidence 1.  [GRIS Eq. 5-6; 6.3 step 1]"""
     return resample(here.of.candidates(here.index, chance), here, chance)
 
 
@@ -59,7 +59,7 @@ def spatial(
     *,
     mis: Weights = WEIGHTS["defensive"],
 ) -> Reservoirs:
-    """Resample every pixel's reservoir with those of its neighbours, all of the same frame X.  [GRIS 6.3 step 3]"""
+    """Resample every pixel's reservoir with its neighbours', all in X.  [GRIS 6.3 step 3]"""
     return gris([Input(X, here), *around(X, neighbours)], here, mis, chance)
 
 
@@ -83,7 +83,7 @@ def shade(X: Reservoirs, here: Pixels) -> Array:
 def capped(X: Reservoirs, cap: float) -> Reservoirs:
     """Confidence c <- min(c, M_c); needs cap > 0, for a null confidence is biased.  [GRIS 6.4]"""
     if not cap > 0:
-        raise ValueError(f"the confidence cap M_c must be positive, but is {cap!r}; leave temporal reuse out instead.")
+        raise ValueError(f"the cap M_c must be positive, but is {cap!r}; leave temporal reuse out instead.")
     return replace(X, c=np.minimum(X.c, cap))
 
 

@@ -34,14 +34,18 @@ class Cells:
     proposal: Array
 
 
-def cells(v: Array, f: Array, pdf: Array, shifts: Array, p_hat: Array | None = None, proposal: Array | None = None) -> Cells:
+def cells(
+    v: Array, f: Array, pdf: Array, shifts: Array, p_hat: Array | None = None, proposal: Array | None = None
+) -> Cells:
     """Tables of a scene, with p_hat = f unless given, and p_hat = 0 where no technique reaches.
 
     Raises ValueError where a density does not integrate to 1 or a shift has no inverse.
     """
     mass = (pdf * v).sum(axis=-1)
     if not np.allclose(np.asarray(mass, dtype=float), 1):
-        raise ValueError(f"every technique's density must integrate to 1, but the integrals are {mass}: divide by them.")
+        raise ValueError(
+            f"every technique's density must integrate to 1, but the integrals are {mass}: divide by them."
+        )
     check_inverse(shifts)
     K = v.shape[-1]
     covered = np.where(pdf.sum(axis=0) > 0, f if p_hat is None else p_hat, 0)
@@ -63,7 +67,7 @@ def check_inverse(shifts: Array) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The n pixels of one frame of a scene: pixel p of frame t is integral t * n + p.  A sample is a cell (N,)."""
+    """The n pixels of one frame: pixel p of frame t is integral t * n + p; a sample is a cell (N,)."""
 
     cells: Cells
     n: int
@@ -101,5 +105,8 @@ class Frame:
         """A mutation by the table of proposals; the ratio is one of densities, so volumes enter."""
         y = chance.choose(self.cells.proposal[x].T)
         i = self.ids(index)
-        forth, back = self.cells.proposal[x, y] * self.cells.v[i, x], self.cells.proposal[y, x] * self.cells.v[i, y]
+        forth, back = (
+            self.cells.proposal[x, y] * self.cells.v[i, x],
+            self.cells.proposal[y, x] * self.cells.v[i, y],
+        )
         return y, ratio(back, forth)

@@ -26,7 +26,7 @@ MOST_LEAVES = 20_000_000
 
 
 class Unanswered(Exception):
-    """A program asked for a choice that no lane has an answer for yet; carries its weights (K, lanes * n)."""
+    """A program asked for a choice not answered yet; its weights are (K, lanes * n)."""
 
     def __init__(self, weights: Array) -> None:
         super().__init__("an enumerated program was caught short; run it through outcomes()")
@@ -49,7 +49,9 @@ class Enumerating:
 
     def uniform(self, shape: tuple[int, ...]) -> Array:
         """Refused: a continuous number has no finite list of outcomes."""
-        raise TypeError("uniform() cannot be enumerated: make the draw a choose() over finite cells, or use a Live chance.")
+        raise TypeError(
+            "uniform() cannot be enumerated: make the draw a choose() over finite cells, or use a Live chance."
+        )
 
 
 @dataclass(frozen=True)
@@ -126,5 +128,6 @@ def _split(lanes: Lanes) -> list[Lanes]:
     """Cut a frontier that is too long for one batch."""
     cuts = range(0, len(lanes), LANES_AT_ONCE)
     return [
-        Lanes([a[k : k + LANES_AT_ONCE] for a in lanes.answers], lanes.probability[k : k + LANES_AT_ONCE]) for k in cuts
+        Lanes([a[k : k + LANES_AT_ONCE] for a in lanes.answers], lanes.probability[k : k + LANES_AT_ONCE])
+        for k in cuts
     ]
