@@ -73,7 +73,7 @@ def ratio(a: Array, b: Array) -> Array:
     defined = np.not_equal(b, 0)
     if defined.all():
         return np.asarray(a / b)
-    return np.asarray(np.where(defined, a, 0) / np.where(defined, b, 1))
+    return np.where(defined, a / np.where(defined, b, 1), 0)
 
 
 def total(terms: Sequence[Array]) -> Array:

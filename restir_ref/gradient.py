@@ -5,7 +5,7 @@ whose offset path in the other is rebuilt by the inner shift whenever it is need
 any integrals; the passes of `restir` do the rest.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,25 +25,27 @@ class Based:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """The differences int f_i - int f_j, j = partner(i), restricted to one sign of the integrand.
+    """The differences int f_i - int f_j of pairs (i, j), restricted to one sign of the integrand.
 
-    sign = +1 or -1; contributions are signed, so an estimate adds up the two signs' shading.
-    Scalar integrands only: with colours the sign of a difference is ambiguous.
+    ends (2, E) holds the pixels i and j of every pair; column = replica * E + pair.  sign = +1 or
+    -1; contributions are signed, so an estimate adds up the two signs' shading.  Scalar integrands
+    only: with colours the sign of a difference is ambiguous.
     """
 
     of: Integrals
-    partner: Callable[[Array], Array]
+    ends: Array
     sign: int
 
     def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Based, Array]]:
         """Both pixels' candidates: they cover disjoint halves of the paired domain."""
-        for k, pixel in enumerate((index, self.partner(index))):
-            for x, mW in self.of.candidates(pixel, chance):
-                yield Based(x, np.full(len(index), k)), mW
+        for k in (0, 1):
+            side = np.full(len(index), k)
+            for x, mW in self.of.candidates(self.end(index, side), chance):
+                yield Based(x, side), mW
 
     def target(self, index: Array, x: Based) -> Array:
         """p_hat = max(+-w* G, 0).  [GPT Eq. 26]"""
-        return np.asarray(np.maximum(self.sign * self._difference(index, x), 0))
+        return np.asarray(np.maximum(self.sign * self.difference(index, x), 0))
 
     def contribution(self, index: Array, x: Based) -> Array:
         """w* G where it has this sign, shape (1, N).  [GPT Eq. 24]"""
@@ -52,19 +54,23 @@ class Pairs:
     def shift(self, x: Based, index: Array, to: Pixels) -> Shifted:
         """Outer shift: the base path moves from i to i' or j to j'; k stays; J* = J_tau.  [GPT Eq. 21-22]"""
         there: Pairs = to.of  # type: ignore[assignment]
-        outer = self.of.shift(x.x, self._side(index, x.k), Pixels(there.of, there._side(to.index, x.k)))
+        outer = self.of.shift(x.x, self.end(index, x.k), Pixels(there.of, there.end(to.index, x.k)))
         return Shifted(Based(outer.x, x.k), outer.J)
 
-    def _side(self, index: Array, k: Array) -> Array:
-        """The pixel on side k of the pair."""
-        return np.where(k == 0, index, self.partner(index))
+    def end(self, index: Array, k: Array) -> Array:
+        """The pixel on side k (N,) of each column's pair."""
+        return np.asarray(self.ends[k, index % self.ends.shape[-1]])
 
-    def _difference(self, index: Array, x: Based) -> Array:
-        """w* G = w (f_base(x) - f_offset(T x) J), negated for bases in pixel j.  [GPT Eq. 13, 15, 16]"""
-        base = Pixels(self.of, self._side(index, x.k))
-        offset = Pixels(self.of, self._side(index, 1 - x.k))
+    def difference(self, index: Array, x: Based) -> Array:
+        """w* G = w (f_base(x) - f_offset(T x) J), negated for bases in pixel j; (N,).  [GPT Eq. 13, 15, 16]"""
+        base = Pixels(self.of, self.end(index, x.k))
+        offset = Pixels(self.of, self.end(index, 1 - x.k))
         y = self.of.shift(x.x, base.index, offset)
         p_base, p_offset = target(base, x.x), target(offset, y.x) * y.J
-        f_base, f_offset = (at.of.contribution(at.index, z)[0] for at, z in ((base, x.x), (offset, y.x)))
-        difference = ratio(p_base * (f_base - f_offset * y.J), p_base + p_offset)
+        f_base, f_offset = self._f(base, x.x), self._f(offset, y.x) * y.J
+        difference = ratio(p_base * (f_base - f_offset), p_base + p_offset)
         return np.where(x.k == 0, difference, -difference)
+
+    def _f(self, at: Pixels, x: Sample) -> Array:
+        """The scalar integrand of one pixel."""
+        return self.of.contribution(at.index, x)[0]

@@ -27,7 +27,7 @@ class Integrals(Protocol):
         """
 
     def target(self, index: Array, x: Sample) -> Array:
-        """p_hat_i(x) >= 0, (N,); reads x, never traces again.  Law: supp p_hat inside supp X."""
+        """p_hat_i(x) >= 0, (N,); reads x, traces nothing.  Law: supp p_hat inside supp X."""
 
     def contribution(self, index: Array, x: Sample) -> Array:
         """f_i(x), shape (C, N)."""

@@ -57,6 +57,11 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
         yield Candidate(y.x, q(-1), m * source.X.W * y.J, c_over_m)
 
 
+def contribution_weight(y: Candidate) -> Array:
+    """c_i W_i J_i of one candidate, which is m_i W_i J_i unless the weights differ; (N,).  [GRIS Eq. 13]"""
+    return y.mW if y.c_over_m is None else y.c_over_m * y.mW
+
+
 def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservoirs:
     """Choose Y by w_i = p_hat(Y_i) m_i W_i; W_Y = (c_s/m_s) sum_j w_j / p_hat(Y).  [GRIS Eq. 21-22]
 

@@ -14,7 +14,7 @@ from restir_ref.batch import Array, take, total
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs, Sample, target
 from restir_ref.mis import WEIGHTS, Weights
-from restir_ref.resampling import Candidate, Input, gris, select, weigh
+from restir_ref.resampling import Candidate, Input, contribution_weight, gris, select, weigh
 
 M_CAP = 20
 """Default cap M_c on the confidence of history.  [GRIS 8.3]"""
@@ -70,9 +70,9 @@ def reuse_all(
     *,
     mis: Weights = WEIGHTS["talbot"],
 ) -> Array:
-    """sum_i f(Y_i) m_i W_i J_i: shift all, select none; (C, N).  [Bekaert 2002], by GRIS' weights."""
-    inputs = [Input(X, here), *around(X, neighbours)]
-    return total([here.of.contribution(here.index, y.x) * y.mW for y in weigh(inputs, here, mis)])
+    """sum_i f(Y_i) c_i W_i J_i: shift all, select none; (C, N).  [GRIS Eq. 13-14; Bekaert 2002]"""
+    shifted = weigh([Input(X, here), *around(X, neighbours)], here, mis)
+    return total([here.of.contribution(here.index, y.x) * contribution_weight(y) for y in shifted])
 
 
 def shade(X: Reservoirs, here: Pixels) -> Array:

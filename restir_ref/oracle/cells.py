@@ -23,7 +23,7 @@ class Cells:
     p_hat    (I, K)     target function
     pdf      (T, I, K)  densities of the sampling techniques, sum_x pdf v = 1
     shifts   (I, I, K)  shifts[i, j, x] = T_ij(x), or -1 where undefined; partial injections, T_ji = T_ij^-1
-    proposal (K, K)     proposal[x, x'] = probability of a mutation from cell x to x'
+    proposal (K, K)     proposal[x, x'] = probability that a mutation moves from cell x to x'
     """
 
     v: Array
@@ -49,8 +49,8 @@ def cells(
     check_inverse(shifts)
     K = v.shape[-1]
     covered = np.where(pdf.sum(axis=0) > 0, f if p_hat is None else p_hat, 0)
-    uniform = np.ones((K, K), dtype=int)
-    return Cells(v, f, covered, pdf, shifts, uniform if proposal is None else proposal)
+    moves = np.ones((K, K), dtype=int) if proposal is None else proposal
+    return Cells(v, f, covered, pdf, shifts, ratio(moves, moves.sum(axis=-1, keepdims=True)))
 
 
 def check_inverse(shifts: Array) -> None:
