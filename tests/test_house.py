@@ -1,0 +1,208 @@
+"""Laws over the source: imports point down, chance has one door, everything public is explained.
+
+Every law is a function that lists offenders; its twin plants one, which must be listed.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from importlib.util import resolve_name
+from pathlib import Path
+
+import pytest
+
+from tests.checkout import ROOT, WORLDS, Module, modules, plant
+
+THEORY, TRANSPORT = "restir_ref", "restir_ref.transport"
+MAY_IMPORT = {
+    THEORY: {THEORY},
+    TRANSPORT: {THEORY, TRANSPORT},
+    **{world: {THEORY, TRANSPORT, world} for world in WORLDS},
+    "figures": {THEORY, TRANSPORT, *WORLDS, "figures"},
+}
+FLOORS = (*MAY_IMPORT, "tests", "benchmarks", "notebooks")
+PACKAGES = (THEORY, *WORLDS, "figures")
+
+# ---------------------------------------------------------------- imports
+
+
+def floor(name: str) -> str | None:
+    """The floor of the house a dotted name belongs to; None for other people's packages."""
+    return max((f for f in FLOORS if f"{name}.".startswith(f"{f}.")), key=len, default=None)
+
+
+def imported(module: Module) -> Iterator[str]:
+    """Dotted names a module imports, also inside functions and for type checking."""
+    package = module.name if module.path.stem == "__init__" else module.name.rpartition(".")[0]
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            source = resolve_name("." * node.level + (node.module or ""), package)
+            yield from (f"{source}.{alias.name}" for alias in node.names)
+
+
+def upward_imports(root: Path) -> list[str]:
+    """Imports that do not point down: theory, transport, worlds (side by side), figures."""
+    found = ((module.name, name) for module in modules(root, PACKAGES) for name in imported(module))
+    ours = ((by, name) for by, name in found if floor(name))
+    return [f"{by} imports {name}" for by, name in ours if floor(name) not in MAY_IMPORT[floor(by)]]
+
+
+def import_cycle(root: Path) -> list[str]:
+    """A chain of modules that import one another when the program runs, if there is one."""
+    parsed = {module.name: untyped(module) for module in modules(root, PACKAGES)}
+    graph = {name: owners(imported(module), parsed.keys()) - {name} for name, module in parsed.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as cycle:
+        return cycle.args[1]
+    return []
+
+
+def untyped(module: Module) -> Module:
+    """The module without what only a type checker imports."""
+    guards = [n for n in module.tree.body if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.unparse(n.test)]
+    return module._replace(tree=ast.Module([n for n in module.tree.body if n not in guards], []))
+
+
+def owners(names: Iterator[str], ours: set[str]) -> set[str]:
+    """The modules that hold the imported names; a package's __init__ owns only what is not a module."""
+    return {name if name in ours else name.rpartition(".")[0] for name in names} & ours
+
+
+def test_imports_point_down():
+    assert upward_imports(ROOT) == []
+
+
+def test_imports_make_no_cycle():
+    assert import_cycle(ROOT) == []
+
+
+UPWARD = {
+    "theory to world": ("restir_ref/mis.py", "import toy1d.pixels"),
+    "theory to figures": ("restir_ref/mis.py", "from figures import style"),
+    "theory to transport": ("restir_ref/mis.py", "from . import transport"),
+    "oracle to transport": ("restir_ref/oracle/audit.py", "from ..transport.paths import trace"),
+    "transport to world": ("restir_ref/transport/paths.py", "def late():\n    from toy1d import pixels"),
+    "world to world": ("flatland2d/scenes.py", "from toy1d import pixels"),
+    "figures to tests": ("figures/runner.py", "from tests import conftest"),
+}
+
+
+@pytest.mark.parametrize(("path", "text"), UPWARD.values(), ids=UPWARD)
+def test_an_import_that_points_up_is_noticed(tmp_path, path, text):
+    assert len(upward_imports(plant(tmp_path, path, text))) == 1
+
+
+def test_imports_that_point_down_are_left_alone(tmp_path):
+    plant(tmp_path, "restir_ref/transport/paths.py", "from restir_ref import batch\nfrom . import vectors")
+    plant(tmp_path, "figures/two_pixels.py", "import numpy\nfrom toy1d.pixels import two_pixels")
+    assert upward_imports(tmp_path) == import_cycle(tmp_path) == []
+
+
+def test_a_cycle_is_noticed(tmp_path):
+    plant(tmp_path, "toy1d/pixels.py", "from toy1d.scenes import ajar")
+    assert not import_cycle(plant(tmp_path, "toy1d/scenes.py", "if TYPE_CHECKING:\n    from toy1d import pixels"))
+    assert import_cycle(plant(tmp_path, "toy1d/scenes.py", "from toy1d import pixels"))
+
+
+# ---------------------------------------------------------------- chance
+
+DICE = re.compile(r"(?:(?:np|numpy)\.)?random\.(?!Generator$)\w+|(?:numpy\.)?random$")
+
+
+def own_dice(root: Path) -> list[str]:
+    """Uses of a random number generator below the figures; only `chance.py` is the door."""
+    below = [module for module in modules(root, (THEORY, *WORLDS)) if module.name != "restir_ref.chance"]
+    uses = ((module, use) for module in below for use in (*imported(module), *attributes(module)))
+    return [f"{module.name} uses {use}" for module, use in uses if DICE.match(use)]
+
+
+def attributes(module: Module) -> Iterator[str]:
+    """Every dotted expression of a module, such as `np.random.default_rng`."""
+    return (ast.unparse(node) for node in ast.walk(module.tree) if isinstance(node, ast.Attribute))
+
+
+def test_chance_has_one_door():
+    assert own_dice(ROOT) == []
+
+
+THROWS = (
+    "import numpy as np\nx = np.random.default_rng(1)",
+    "import numpy\nnumpy.random.seed(1)",
+    "from numpy import random",
+    "from numpy.random import default_rng",
+    "import random",
+    "from random import gauss",
+)
+
+
+@pytest.mark.parametrize("text", THROWS)
+def test_dice_thrown_below_the_figures_are_noticed(tmp_path, text):
+    assert own_dice(plant(tmp_path, "restir_ref/oracle/laws.py", text))
+
+
+def test_taking_a_generator_from_the_caller_is_no_throw(tmp_path):
+    text = "import numpy as np\ndef audit(*, rng: np.random.Generator):\n    return Live(rng)"
+    assert own_dice(plant(tmp_path, "toy1d/pixels.py", text)) == []
+
+
+# ---------------------------------------------------------------- words
+
+
+def undocumented(root: Path) -> list[str]:
+    """Public modules, classes and functions of our packages without a docstring."""
+    found = ((module.name, name) for module in modules(root, PACKAGES) for name in silent(module.tree, "module"))
+    return [f"{module}: {name}" for module, name in found]
+
+
+def silent(node: ast.Module | ast.ClassDef | ast.FunctionDef, name: str) -> Iterator[str]:
+    """Names of the public parts of a node that have no docstring, its own first."""
+    if ast.get_docstring(node) is None:
+        yield name
+    parts = node.body if not isinstance(node, ast.FunctionDef) else []
+    for part in parts:
+        if isinstance(part, ast.ClassDef | ast.FunctionDef) and not part.name.startswith("_"):
+            yield from silent(part, part.name)
+
+
+def test_everything_public_has_a_docstring():
+    assert undocumented(ROOT) == []
+
+
+SILENT = ("x = 1", '"""."""\ndef f(): pass', '"""."""\nclass A:\n    """."""\n    def f(self): pass')
+
+
+@pytest.mark.parametrize("text", SILENT)
+def test_a_missing_docstring_is_noticed(tmp_path, text):
+    assert undocumented(plant(tmp_path, "toy1d/pixels.py", text))
+
+
+# The four papers are cited by a key in capitals, [GRIS Eq. 36] or [GRIS 6.3]; others as [Chao 1982].
+KEY = r"[A-Z]{3,}|[A-Z][a-z]+ \d{4}"
+CITED = re.compile(rf"(?<![\w\]])\[({KEY})(?:\]|,? (?:Eqs?|Secs?|Figs?|Alg|Def|Thm|Theorem|Table|App|\d+)\b)")
+EXPLAINED = re.compile(rf"\*\*\[({KEY})\]\*\*")
+
+
+def unexplained_keys(root: Path) -> list[str]:
+    """Citations in docstrings and comments whose key docs/references.md does not explain."""
+    explained = set(EXPLAINED.findall((root / "docs" / "references.md").read_text(encoding="utf-8")))
+    texts = ((module.name, module.path.read_text(encoding="utf-8")) for module in modules(root, PACKAGES))
+    cited = {(name, key) for name, text in texts for key in CITED.findall(text)}
+    return [f"{name} cites [{key}]" for name, key in sorted(cited) if key not in explained]
+
+
+def test_every_cited_key_is_explained():
+    assert unexplained_keys(ROOT) == []
+
+
+UNEXPLAINED = ("[GROS Eq. 3]", "[GROS 3.1]", "[GROS]", "[Veach 1896]", "[Veach 1896, Eq. 9]")
+
+
+@pytest.mark.parametrize("citation", UNEXPLAINED)
+def test_an_unexplained_key_is_noticed(tmp_path, citation):
+    plant(tmp_path, "docs/references.md", "- **[GRIS]** and **[Veach 1997]**")
+    plant(tmp_path, "toy1d/pixels.py", f'"""p = q.  [GRIS Eq. 1] [Veach 1997]  {citation}"""')
+    assert len(unexplained_keys(tmp_path)) == 1
