@@ -33,9 +33,7 @@ def map_leaves(f: Callable[..., Any], *batches: Any) -> Any:
     if is_dataclass(first) and not isinstance(first, type):
         parts = {each.name: [getattr(b, each.name) for b in batches] for each in fields(first)}
         return type(first)(**{name: map_leaves(f, *leaves) for name, leaves in parts.items()})
-    raise TypeError(
-        f"a batch holds arrays, tuples or dataclasses of arrays, not {type(first).__name__}: {first!r}"
-    )
+    raise TypeError(f"a batch holds arrays, tuples or dataclasses of arrays, not {type(first).__name__}: {first!r}")
 
 
 def take(batch: Batch, index: Array) -> Batch:
@@ -69,7 +67,7 @@ def pick(batches: Sequence[Batch], s: Array) -> Batch:
 
 
 def ratio(a: Array, b: Array) -> Array:
-    """A / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples."""
+    """a / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples."""
     defined = np.not_equal(b, 0)
     if defined.all():
         return np.asarray(a / b)

@@ -52,7 +52,7 @@ class Pairs:
         return np.asarray(self.sign * self.target(index, x)[None])
 
     def shift(self, x: Based, index: Array, to: Pixels) -> Shifted:
-        """Outer shift: the base path moves from i to i' or j to j'; k stays; J* = J_tau.  [GPT Eq. 21-22]"""
+        """Outer shift: the base path moves from i to i' or j to j'; J* = J_tau.  [GPT Eq. 21-22]"""
         there: Pairs = to.of  # type: ignore[assignment]
         outer = self.of.shift(x.x, self.end(index, x.k), Pixels(there.of, there.end(to.index, x.k)))
         return Shifted(Based(outer.x, x.k), outer.J)
@@ -73,4 +73,4 @@ class Pairs:
 
     def _f(self, at: Pixels, x: Sample) -> Array:
         """The scalar integrand of one pixel."""
-        return self.of.contribution(at.index, x)[0]
+        return np.asarray(self.of.contribution(at.index, x)[0])

@@ -27,6 +27,4 @@ def per_column(values: Array, n: int, what: str) -> Array:
     """
     if values.ndim == 0 or values.shape[-1] in (1, n):
         return values
-    raise ValueError(
-        f"{what} has shape {values.shape}, but this batch has {n} columns: the last axis must be {n}."
-    )
+    raise ValueError(f"{what} has shape {values.shape}, but this batch has {n} columns: the last axis must be {n}.")

@@ -27,13 +27,21 @@ class Integrals(Protocol):
         """
 
     def target(self, index: Array, x: Sample) -> Array:
-        """p_hat_i(x) >= 0, (N,); reads x, traces nothing.  Law: supp p_hat inside supp X."""
+        """p_hat_i(x) >= 0, (N,); reads x, traces nothing.  Law: supp p_hat in supp X."""
 
     def contribution(self, index: Array, x: Sample) -> Array:
         """f_i(x), shape (C, N)."""
 
     def shift(self, x: Sample, index: Array, to: "Pixels") -> "Shifted":
         """T(x) from Omega_index to the domains of `to` (another pixel, frame or sign), with its Jacobian."""
+
+
+class Image(Integrals, Protocol):
+    """Integrals that form an image of n pixels: column = replica * n + pixel."""
+
+    @property
+    def n(self) -> int:
+        """Number of pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +75,7 @@ class Reservoirs:
 def target(at: Pixels, x: Sample) -> Array:
     """p_hat(x) of the integrals `at`, checked: (N,), finite and >= 0."""
     p_hat = per_column(at.of.target(at.index, x), len(at.index), "the target p_hat")
-    return nonnegative(
-        p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target()."
-    )
+    return nonnegative(p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target().")
 
 
 def p_hat_from(j: Pixels, y: Sample, here: Pixels) -> Array:

@@ -23,7 +23,7 @@ class Cells:
     p_hat    (I, K)     target function
     pdf      (T, I, K)  densities of the sampling techniques, sum_x pdf v = 1
     shifts   (I, I, K)  shifts[i, j, x] = T_ij(x), or -1 where undefined; partial injections, T_ji = T_ij^-1
-    proposal (K, K)     proposal[x, x'] = probability that a mutation moves from cell x to x'
+    proposal (K, K)     proposal[x, x'] = probability that a mutation moves from cell x to x', if mutations are wanted
     """
 
     v: Array
@@ -31,7 +31,7 @@ class Cells:
     p_hat: Array
     pdf: Array
     shifts: Array
-    proposal: Array
+    proposal: Array | None
 
 
 def cells(
@@ -47,10 +47,9 @@ def cells(
             f"every technique's density must integrate to 1, but the integrals are {mass}: divide by them."
         )
     check_inverse(shifts)
-    K = v.shape[-1]
     covered = np.where(pdf.sum(axis=0) > 0, f if p_hat is None else p_hat, 0)
-    moves = np.ones((K, K), dtype=int) if proposal is None else proposal
-    return Cells(v, f, covered, pdf, shifts, ratio(moves, moves.sum(axis=-1, keepdims=True)))
+    moves = None if proposal is None else ratio(proposal, proposal.sum(axis=-1, keepdims=True))
+    return Cells(v, f, covered, pdf, shifts, moves)
 
 
 def check_inverse(shifts: Array) -> None:
@@ -102,11 +101,9 @@ class Frame:
         return Shifted(np.maximum(y, 0), J)
 
     def propose(self, index: Array, x: Array, chance: Chance) -> tuple[Array, Array]:
-        """A mutation by the table of proposals; the ratio is one of densities, so volumes enter."""
-        y = chance.choose(self.cells.proposal[x].T)
-        i = self.ids(index)
-        forth, back = (
-            self.cells.proposal[x, y] * self.cells.v[i, x],
-            self.cells.proposal[y, x] * self.cells.v[i, y],
-        )
-        return y, ratio(back, forth)
+        """A mutation by the table P of proposals; T(x -> y) = P / v(y) is a density."""
+        P, v, i = self.cells.proposal, self.cells.v, self.ids(index)
+        if P is None:
+            raise ValueError("these cells have no table of mutations: pass proposal= to cells().")
+        y = chance.choose(P[x].T)
+        return y, ratio(P[y, x] * v[i, y], P[x, y] * v[i, x])

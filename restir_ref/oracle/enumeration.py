@@ -49,9 +49,7 @@ class Enumerating:
 
     def uniform(self, shape: tuple[int, ...]) -> Array:
         """Refused: a continuous number has no finite list of outcomes."""
-        raise TypeError(
-            "uniform() cannot be enumerated: make the draw a choose() over finite cells, or use a Live chance."
-        )
+        raise TypeError("uniform() cannot be enumerated: draw by choose() over finite cells, or use a Live chance.")
 
 
 @dataclass(frozen=True)
@@ -128,6 +126,5 @@ def _split(lanes: Lanes) -> list[Lanes]:
     """Cut a frontier that is too long for one batch."""
     cuts = range(0, len(lanes), LANES_AT_ONCE)
     return [
-        Lanes([a[k : k + LANES_AT_ONCE] for a in lanes.answers], lanes.probability[k : k + LANES_AT_ONCE])
-        for k in cuts
+        Lanes([a[k : k + LANES_AT_ONCE] for a in lanes.answers], lanes.probability[k : k + LANES_AT_ONCE]) for k in cuts
     ]

@@ -20,6 +20,8 @@ from restir_ref.mis import Weights
 from restir_ref.oracle.cells import Frame
 from restir_ref.resampling import Input, weigh
 
+NONE = np.arange(0)
+
 
 @dataclass(frozen=True)
 class Moments:
@@ -31,9 +33,9 @@ class Moments:
 
 @dataclass(frozen=True)
 class Source:
-    """An input of a pass: which reservoir of Z (block of K entries), whose pixel, what confidence."""
+    """An input of a pass: where its K entries of Z start, whose pixel it is, and its confidence."""
 
-    block: int
+    start: int
     frame: Frame
     pixel: int
     c: float
@@ -75,24 +77,22 @@ def operator(sources: Sequence[Source], D: int, mis: Weights) -> Operator:
     K = sources[0].frame.cells.v.shape[-1]
     x, one = np.arange(K), np.ones(K)
     at = [Pixels(source.frame, np.full(K, source.pixel)) for source in sources]
-    inputs = [
-        Input(Reservoirs(x, one, source.c * one), pixels) for source, pixels in zip(sources, at, strict=True)
-    ]
+    inputs = [Input(Reservoirs(x, one, source.c * one), pixels) for source, pixels in zip(sources, at, strict=True)]
     L, u, Q = np.zeros((K, D)), np.zeros(D), np.zeros((K, D))
     for source, y in zip(sources, weigh(inputs, at[0], mis), strict=True):
         r = one if y.c_over_m is None else y.c_over_m
-        entry = source.block * K + x
+        entry = source.start + x
         u[entry] += y.p_hat * y.mW
         np.add.at(L, (y.x, entry), r * y.mW)
         np.add.at(Q, (y.x, entry), ratio(r**2 * y.mW, y.p_hat))
     return Operator(L, u, Q)
 
 
-def resampled(Z: Moments, passes: Sequence[Operator]) -> Moments:
-    """Moments of the reservoirs that independent selections in `passes` make of Z, one block per pass."""
-    L = np.concatenate([each.L for each in passes])
+def resampled(Z: Moments, passes: Sequence[Operator], kept: Array = NONE) -> Moments:
+    """Moments of what independent selections in `passes` make of Z, one block each, then of the entries `kept`."""
+    D, K = len(Z.mean), len(passes[0].L)
+    L = np.concatenate([*(each.L for each in passes), np.eye(D)[kept]])
     second = L @ Z.second @ L.T
-    K = len(passes[0].L)
     for i, each in enumerate(passes):
         block = slice(i * K, (i + 1) * K)
         second[block, block] = np.diag(each.Q @ (Z.second @ each.u))

@@ -11,7 +11,7 @@ import numpy as np
 
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
-from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.integrals import Image, Pixels, Reservoirs
 from restir_ref.mis import WEIGHTS, Weights
 from restir_ref.oracle.cells import Frame, cells
 from restir_ref.restir import initial, spatial, temporal
@@ -40,11 +40,11 @@ class Scene:
 
     @property
     def support(self) -> Array:
-        """Supp p_hat of the current frame, (n, K)."""
+        """supp p_hat of the current frame, (n, K)."""
         return np.asarray(self.now.cells.p_hat[self.now.ids(np.arange(self.now.n))] > 0)
 
 
-def offset(of: Frame, index: Array, by: int) -> Pixels:
+def offset(of: Image, index: Array, by: int) -> Pixels:
     """The pixels `by` further to the right, cyclically, within each column's own lane."""
     return Pixels(of, index - index % of.n + (index + by) % of.n)
 
@@ -108,6 +108,7 @@ def reference_scene(of: type[Frame] = Frame) -> Scene:
         f=np.array([[2.0, 1.0, 0.0, 3.0], [1.0, 3.0, 0.5, 1.0], [1.0, 0.0, 4.0, 2.0], [2.0, 0.5, 1.0, 3.0]]),
         pdf=normalised([[2, 1, 1, 1], [1, 1, 0, 1], [1, 1, 2, 1], [3, 1, 1, 2]], v),
         shifts=paired(4, 4, shifts),
+        proposal=np.ones((4, 4)),
     )
     return Scene([of(tables, 2, 0), of(tables, 2, 1)])
 

@@ -17,9 +17,7 @@ DENSITIES = [0, 1, 1, 2, 4]  # zeros: samplers that do not cover
 
 def table(draw: st.DrawFn, shape: tuple[int, ...], values: list[float]) -> Array:
     size = int(np.prod(shape))
-    return np.array(
-        draw(st.lists(st.sampled_from(values), min_size=size, max_size=size)), dtype=float
-    ).reshape(shape)
+    return np.array(draw(st.lists(st.sampled_from(values), min_size=size, max_size=size)), dtype=float).reshape(shape)
 
 
 @st.composite
@@ -51,9 +49,7 @@ def exactly(scene: Scene) -> Scene:
     v, f, p_hat = (fractions(values) for values in (old.v, old.f, old.p_hat))
     pdf = fractions(np.round(old.pdf / old.pdf.max(axis=-1, keepdims=True), 6))
     pdf = pdf / (pdf * v).sum(axis=-1)[..., None]
-    return Scene(
-        [Frame(cells(v, f, pdf, old.shifts, p_hat, old.proposal), each.n, each.t) for each in scene.frames]
-    )
+    return Scene([Frame(cells(v, f, pdf, old.shifts, p_hat, old.proposal), each.n, each.t) for each in scene.frames])
 
 
 def fractions(values: Array) -> Array:

@@ -39,9 +39,7 @@ def test_candidates_of_techniques_that_do_not_all_cover_are_unbiased(scene: Scen
     assert largest_bias(spatial_loop(scene, WEIGHTS["talbot"], 0), scene) < 1e-13
 
 
-@pytest.mark.claims(
-    "GRIS-E07", "GRIS-E08", "GRIS-E16", "GRIS-E21", "GRIS-E35", "GRIS-E36", "GRIS-E37", "GRIS-E38"
-)
+@pytest.mark.claims("GRIS-E07", "GRIS-E08", "GRIS-E16", "GRIS-E21", "GRIS-E35", "GRIS-E36", "GRIS-E37", "GRIS-E38")
 @every_promising_weight
 @given(scene=scenes(n=3), passes=st.just(1))
 def test_one_spatial_pass_is_unbiased(mis, scene, passes) -> None:
