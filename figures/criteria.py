@@ -1,0 +1,142 @@
+"""Criteria that can fail: each takes numbers and returns an Outcome (measured value, rule, answer).
+
+NaN passes nothing. Random error is judged with a power clause: too noisy to decide is a failure.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+BOOTSTRAP = 2000  # resamples behind a confidence interval
+STREAM = 0x5EED  # fixed stream of the bootstrap: the same errors always give the same verdict
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a criterion found: a measured number or short text, the rule in words, and whether it passed."""
+
+    measured: float | str
+    criterion: str
+    passed: bool
+
+
+def within(value: ArrayLike, target: float, tol: float) -> Outcome:
+    """|value - target| <= tol."""
+    v = float(np.asarray(value))
+    return Outcome(v, f"{target:g} ± {tol:g}", bool(abs(v - target) <= tol))
+
+
+def between(value: ArrayLike, low: float, high: float) -> Outcome:
+    """Low <= value <= high."""
+    v = float(np.asarray(value))
+    return Outcome(v, f"in [{low:g}, {high:g}]", bool(low <= v <= high))
+
+
+def below(value: ArrayLike, limit: float) -> Outcome:
+    """Value < limit."""
+    v = float(np.asarray(value))
+    return Outcome(v, f"< {limit:g}", bool(v < limit))
+
+
+def above(value: ArrayLike, limit: float) -> Outcome:
+    """Value > limit."""
+    v = float(np.asarray(value))
+    return Outcome(v, f"> {limit:g}", bool(v > limit))
+
+
+def equal_to(value: ArrayLike, target: ArrayLike, tol: float = 1e-12) -> Outcome:
+    """Largest |value - target| <= tol max(|target|), over all elements; tol = 0 means bitwise equal values.
+
+    Reports the value of two scalars, otherwise the largest deviation relative to max |target|.
+    """
+    v, t = np.asarray(value, dtype=float), np.asarray(target, dtype=float)
+    deviation = float(np.max(np.abs(v - t), initial=0.0))
+    size = float(np.max(np.abs(t), initial=0.0))
+    passed = bool(v.shape == t.shape and deviation <= tol * size)
+    if v.ndim == t.ndim == 0:
+        return Outcome(float(v), f"= {float(t):.10g} (relative {tol:g})", passed)
+    return Outcome(deviation / (size or 1.0), f"largest relative deviation <= {tol:g}", passed)
+
+
+def slope(x: ArrayLike, y: ArrayLike) -> float:
+    """Least-squares slope of log y over log x; x, y (n,); NaN where a logarithm is missing."""
+    log_x, log_y = (_log10(v) for v in (x, y))
+    centred = log_x - log_x.mean()
+    spread = float(centred @ centred)
+    return float(centred @ log_y) / spread if spread > 0 else float("nan")
+
+
+def slope_within(
+    x: ArrayLike, y: ArrayLike, target: float, tol: float, points: int = 6, decades: float = 2.0
+) -> Outcome:
+    """|slope of log y over log x - target| <= tol, from at least `points` abscissae spanning `decades`."""
+    s, log_x = slope(x, y), _log10(x)
+    enough = len(np.unique(log_x)) >= points and bool(np.ptp(log_x) >= decades - 1e-9)
+    rule = f"log-log slope {target:g} ± {tol:g} (>= {points} points over >= {decades:g} decades)"
+    return Outcome(s, rule, bool(enough and abs(s - target) <= tol))
+
+
+def unbiased(estimates: ArrayLike, reference: float, eps: float = 0.005, replicates: int = 64) -> Outcome:
+    """|mean - reference| <= 4 SE and SE <= eps |reference|, over (R,) replicates, R >= `replicates`."""
+    e = np.asarray(estimates, dtype=float)
+    bias, error, text = _bias(e, reference)
+    passed = abs(bias) <= 4 * error and error <= eps * abs(reference) and e.size >= replicates
+    return Outcome(text, f"|bias| <= 4 SE, SE <= {eps:.3g} of the truth, R >= {replicates}", bool(passed))
+
+
+def biased(estimates: ArrayLike, reference: float, low: float, high: float) -> Outcome:
+    """|mean - reference| >= 8 SE and the relative bias lies in [low, high]: for what must be wrong; (R,)."""
+    bias, error, text = _bias(np.asarray(estimates, dtype=float), reference)
+    passed = abs(bias) >= 8 * error and abs(bias) > 0 and low <= bias / reference <= high
+    return Outcome(text, f"|bias| >= 8 SE, relative bias in [{low:g}, {high:g}]", bool(passed))
+
+
+def ratio_below(errors: ArrayLike, others: ArrayLike, limit: float) -> Outcome:
+    """mean(errors) / mean(others) < limit with its whole bootstrap 95% interval; paired replicates (R,)."""
+    _, high, text = ratio_interval(errors, others)
+    return Outcome(text, f"ratio < {limit:g} at 95%", bool(high < limit))
+
+
+def ratio_above(errors: ArrayLike, others: ArrayLike, limit: float) -> Outcome:
+    """mean(errors) / mean(others) > limit with its whole bootstrap 95% interval; paired replicates (R,)."""
+    low, _, text = ratio_interval(errors, others)
+    return Outcome(text, f"ratio > {limit:g} at 95%", bool(low > limit))
+
+
+def ratio_interval(errors: ArrayLike, others: ArrayLike) -> tuple[float, float, str]:
+    """(low, high, text) of mean(errors) / mean(others), bootstrapped over paired replicates (R,), R >= 8."""
+    a, b = np.asarray(errors, dtype=float), np.asarray(others, dtype=float)
+    if a.shape != b.shape or a.ndim != 1 or a.size < 8:
+        raise ValueError(f"a ratio needs at least 8 paired replicates, got shapes {a.shape} and {b.shape}")
+    chosen = np.random.default_rng(STREAM).integers(a.size, size=(BOOTSTRAP, a.size))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = np.quantile(a[chosen].mean(axis=1) / b[chosen].mean(axis=1), [0.025, 0.975])
+        ratio = a.mean() / b.mean()
+    return float(low), float(high), f"{ratio:.4g} (95% {low:.4g} to {high:.4g})"
+
+
+def all_of(*outcomes: Outcome) -> Outcome:
+    """Every one of the outcomes passes (use it for a counter-criterion with several conditions)."""
+    measured = "; ".join(show(o.measured) for o in outcomes)
+    return Outcome(measured, "; ".join(o.criterion for o in outcomes), all(o.passed for o in outcomes))
+
+
+def show(measured: float | str) -> str:
+    """A measured value as short text."""
+    return measured if isinstance(measured, str) else f"{measured:.4g}"
+
+
+def _log10(values: ArrayLike) -> NDArray[np.float64]:
+    v = np.asarray(values, dtype=float)
+    result = np.full(v.shape, np.nan)
+    np.log10(v, out=result, where=v > 0)
+    return result
+
+
+def _bias(e: NDArray[np.float64], reference: float) -> tuple[float, float, str]:
+    """Bias and its standard error of replicates e (R,), and both in words."""
+    error = float(e.std(ddof=1) / np.sqrt(e.size)) if e.size > 1 else float("inf")
+    bias = float(e.mean()) - reference
+    size, z = abs(reference) or 1.0, bias / error if error > 0 else 0.0 if bias == 0 else float("inf")
+    return bias, error, f"bias {bias / size:+.3%} (SE {error / size:.3%}, z = {z:.2f}, R = {e.size})"

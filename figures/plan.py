@@ -1,0 +1,137 @@
+"""What one run asks of one figure: its declared chunks, their files, and the keys these must carry."""
+
+import json
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from figures import disk, store
+from figures.errors import FigureError
+from figures.figure import Arrays, Data, Figure
+from figures.jobs import Job
+from figures.registry import Entry
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A figure under one preset and seed, the parameters of its chunks, and its folder.
+
+    `trouble` is the traceback of a figure that could not even declare its chunks.
+    """
+
+    module: str
+    figure: Figure
+    preset: str
+    data: Data
+    parts: tuple[Data, ...]
+    seed: int
+    folder: Path
+    trouble: str = ""
+
+
+def plan(entry: Entry, preset: str, seed: int, out: Path) -> Plan:
+    """Ask the figure for its chunks; the count is its own and does not depend on the workers."""
+    figure = entry.figure
+    data: Data = _round_trip(figure.presets[preset])
+    parts, trouble = (), ""
+    try:
+        parts = tuple(_round_trip(part) for part in figure.chunks(data))
+    except Exception:
+        trouble = traceback.format_exc()
+    return Plan(entry.module, figure, preset, data, parts, seed, out / figure.id, trouble)
+
+
+def _round_trip(data: Any) -> Any:
+    """Data as a worker or a stored key sees it: dicts and lists, whatever the module wrote."""
+    return json.loads(store.canonical(data))
+
+
+def job(plan: Plan, number: int) -> Job:
+    """Chunk `number` as a pure job."""
+    return Job(plan.module, plan.figure.id, plan.data, number, plan.parts[number], plan.seed)
+
+
+def key(plan: Plan) -> str:
+    """Everything the figure's arrays depend on."""
+    return store.canonical(_identity(plan))
+
+
+def chunk_key(plan: Plan, number: int) -> str:
+    """Everything the arrays of one chunk depend on."""
+    return store.canonical({**_identity(plan), "chunk": number, "parameters": plan.parts[number]})
+
+
+def _identity(plan: Plan) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "figure": plan.figure.id,
+        "version": plan.figure.version,
+        "preset": plan.preset,
+        "data": plan.data,
+        "chunks": len(plan.parts),
+        "seed": plan.seed,
+    }
+
+
+def chunk_path(plan: Plan, number: int) -> Path:
+    """The file of chunk `number`."""
+    return plan.folder / "chunks" / f"{number:03d}.npz"
+
+
+def arrays_path(plan: Plan) -> Path:
+    """The file of the combined arrays."""
+    return plan.folder / "arrays.npz"
+
+
+def prepare(plan: Plan, warn: Callable[[str], object]) -> set[int]:
+    """Make the folder, clean up after killed runs, set damaged chunks aside; return the missing numbers.
+
+    A file of another run or program is an error: it is neither used nor overwritten.
+    """
+    _make(plan.folder / "chunks")
+    found = {n: store.state(chunk_path(plan, n), chunk_key(plan, n)) for n in range(len(plan.parts))}
+    for path, trouble in _foreign(plan, found):
+        raise FigureError(
+            f"{path} is not a part of this run: {trouble}. "
+            f"Choose another folder with --out, or delete {plan.folder} to compute the figure anew"
+        )
+    for path, trouble in ((chunk_path(plan, n), text) for n, (s, text) in found.items() if s == "damaged"):
+        warn(f"{path} is damaged ({trouble}): set aside as {disk.set_aside(path).name}, computed again")
+    return {number for number, (state, _) in found.items() if state != "ours"}
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        disk.sweep(folder.parent)
+        disk.sweep(folder)
+    except OSError as error:
+        raise FigureError(disk.unwritable(folder, error)) from error
+
+
+def _foreign(plan: Plan, found: Mapping[int, tuple[store.State, str]]) -> Iterator[tuple[Path, str]]:
+    state, trouble = store.state(arrays_path(plan), key(plan))
+    if state == "foreign":
+        yield arrays_path(plan), trouble
+    yield from ((chunk_path(plan, n), trouble) for n, (state, trouble) in found.items() if state == "foreign")
+    ours = {chunk_path(plan, number) for number in found}
+    for path in sorted((plan.folder / "chunks").iterdir()):
+        if path not in ours and not path.name.startswith(".") and path.suffix != disk.ASIDE:
+            yield path, f"it is none of the figure's {len(ours)} chunks"
+
+
+def read_chunks(plan: Plan) -> list[Arrays]:
+    """The arrays of all chunks, in order, from their files."""
+    return [_read_chunk(plan, number) for number in range(len(plan.parts))]
+
+
+def _read_chunk(plan: Plan, number: int) -> Arrays:
+    path = chunk_path(plan, number)
+    found = store.load(path, chunk_key(plan, number))
+    if found.state != "ours":
+        raise FigureError(f"{path} was changed while the run was under way: {found.trouble or 'it is gone'}")
+    return found.arrays

@@ -1,0 +1,1 @@
+"""Tiny figures, one module each, that worker processes import by name."""

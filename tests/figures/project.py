@@ -1,0 +1,59 @@
+"""Projects made for one test: a ledger, a folder of tests, and figures of `tests.figures.demos`."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from figures.cli import main
+from figures.registry import ROOT, Project
+
+
+def claim(id_="DEMO-C01", quick="reproduced", paper=None):
+    """A row of a ledger."""
+    texts = {"paper": "DEMO", "class": "A", "source": "Fig. 1", "sentence": f"Sentence <{id_}>."}
+    return {
+        "id": id_,
+        **texts,
+        "criterion": "0.5",
+        "worlds": [],
+        "expected": {"quick": quick, "paper": paper},
+    }
+
+
+CLAIMS = (claim(), claim("DEMO-C02", quick="refuted"))
+
+
+def project(folder, *demos, claims=CLAIMS):
+    """A project of its own."""
+    (folder / "tests").mkdir(parents=True, exist_ok=True)
+    (folder / "ledger.json").write_text(json.dumps({"format": 1, "claims": list(claims)}))
+    modules = tuple(f"tests.figures.demos.{name}" for name in demos)
+    return Project(modules, folder / "ledger.json", folder / "tests")
+
+
+def figures(here, *words):
+    """The command in this process: its exit status."""
+    return main([str(word) for word in words], here)
+
+
+def started(here, *words):
+    """The command in a process of its own, under way."""
+    command = [sys.executable, "-m", "tests.figures.project", str(here.ledger.parent), ",".join(here.modules)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen([*command, *map(str, words)], cwd=ROOT, **pipes)
+
+
+def arrays(out):
+    """Every array file under a folder: relative path -> bytes."""
+    return {path.relative_to(out).as_posix(): path.read_bytes() for path in sorted(out.rglob("*.npz"))}
+
+
+def from_command_line(folder, modules, *words):
+    """The command on a project that another process has made."""
+    place = Path(folder)
+    return main(words, Project(tuple(modules.split(",")), place / "ledger.json", place / "tests"))
+
+
+if __name__ == "__main__":
+    sys.exit(from_command_line(*sys.argv[1:]))

@@ -1,0 +1,144 @@
+"""Laws of verdicts: from a check to a claim, and from the figures of a folder to what the ledger expects."""
+
+import itertools
+import json
+
+import pytest
+
+from figures import record, verdicts
+from figures.criteria import above, below, within
+from figures.errors import FigureError
+from figures.figure import VERDICTS, Claim, undeclared, verdict_line, verdict_of, worst
+from figures.ledger import Row
+from figures.record import Check, Record
+from tests.figures.demos.sound import figure
+
+HIT, MISS = within(0, 0, 1), within(3, 0, 1)
+DECISIONS = {
+    "reproduced": Claim("A-1", HIT),
+    "reproduced with caveat": Claim("A-1", HIT, caveat="only in flatland"),
+    "not reproduced": Claim("A-1", MISS, caveat="only in flatland"),
+    "refuted": Claim("A-1", MISS, counter=above(3, 2)),
+}
+
+
+@pytest.mark.parametrize("verdict", DECISIONS)
+def test_every_verdict_can_come_about(verdict):
+    assert verdict_of(DECISIONS[verdict]) == verdict
+
+
+def test_the_cases_above_are_all_verdicts():
+    assert tuple(DECISIONS) == VERDICTS
+
+
+def test_a_miss_without_certainty_of_the_opposite_is_no_refutation():
+    assert verdict_of(Claim("A-1", MISS, counter=below(3, 2))) == "not reproduced"
+
+
+def test_a_pass_is_no_refutation_whatever_the_counter_says():
+    assert verdict_of(Claim("A-1", HIT, counter=HIT)) == "reproduced"
+
+
+@pytest.mark.parametrize(("a", "b"), list(itertools.combinations(VERDICTS, 2)))
+def test_the_worst_check_decides(a, b):
+    assert worst([a, b]) == worst([b, a]) == b
+
+
+def test_the_line_under_a_picture_says_what_was_measured_and_the_rule():
+    line = verdict_line(Claim("GRIS-F07", within(-1.0, -1, 0.1), part="slope"))
+    assert line == "GRIS-F07 reproduced: slope -1 (criterion -1 ± 0.1)"
+
+
+@pytest.mark.parametrize(
+    ("checked", "problem"),
+    [
+        (("DEMO-C01",), ""),
+        (("DEMO-C01", "DEMO-C09"), "checks 'DEMO-C09' without declaring it"),
+        ((), "declares 'DEMO-C01' without checking it"),
+    ],
+)
+def test_a_figure_checks_what_it_declares(checked, problem):
+    assert undeclared(figure(), [Claim(id_, HIT) for id_ in checked]) == problem
+
+
+def row(expected):
+    return Row("A-1", "A", "A", "", "", "", {"quick": expected, "paper": None})
+
+
+def found(id_, *verdicts, status="done"):
+    checks = tuple(Check("A-1", "", "", 1.0, "", verdict, "", "") for verdict in verdicts)
+    return Record(id_, "", "", "", "quick", 1, 1, ["A-1"], status, "", checks)
+
+
+def judged(records, expected, declared=("F-1",)):
+    (only,) = verdicts.judge(records, {"A-1": row(expected)}, {"A-1": set(declared)})
+    return only.verdict, only.agrees
+
+
+BOTH = ("F-1", "F-2")
+
+
+@pytest.mark.parametrize(
+    ("records", "expected", "declared", "answer"),
+    [
+        ([found("F-1", "reproduced")], "reproduced", ("F-1",), ("reproduced", True)),
+        ([found("F-1", "reproduced")], "refuted", ("F-1",), ("reproduced", False)),
+        ([found("F-1", "reproduced", "refuted")], "reproduced", ("F-1",), ("refuted", False)),
+        ([found("F-1", "refuted")], None, ("F-1",), ("refuted", None)),
+        ([found("F-1", status="crashed")], "reproduced", ("F-1",), (None, None)),
+        ([found("F-1", "reproduced")], "refuted", BOTH, ("reproduced", True)),
+        ([found("F-1", "refuted")], "reproduced", BOTH, ("refuted", False)),
+        ([found("F-1", "reproduced"), found("F-2", "refuted")], "refuted", BOTH, ("refuted", True)),
+        ([found("F-1", "reproduced"), found("F-2", "reproduced")], "refuted", BOTH, ("reproduced", False)),
+    ],
+)
+def test_a_claim_is_compared_once_all_its_figures_have_spoken(records, expected, declared, answer):
+    assert judged(records, expected, declared) == answer
+
+
+def test_kept_verdicts_are_read_back(tmp_path):
+    rows = verdicts.judge([found("F-1", "reproduced", "refuted")], {"A-1": row(None)}, {"A-1": {"F-1"}})
+    verdicts.write(rows, tmp_path)
+    assert verdicts.read(tmp_path) == {"A-1": "refuted"}
+
+
+def test_a_folder_without_verdicts_has_none(tmp_path):
+    assert verdicts.read(tmp_path) == {}
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"verdicts": [{"id": "A-1"}]}', '{"verdicts": [{"id":1,"verdict":"x"}]}'])
+def test_damaged_verdicts_are_named(tmp_path, text):
+    (tmp_path / verdicts.NAME).write_text(text)
+    with pytest.raises(FigureError, match=r"verdicts\.json is damaged"):
+        verdicts.read(tmp_path)
+
+
+def test_a_kept_record_is_read_back(tmp_path):
+    folder = tmp_path / "F-1"
+    folder.mkdir()
+    record.write(found("F-1", "reproduced", "refuted"), folder)
+    assert record.read(folder) == found("F-1", "reproduced", "refuted")
+
+
+DAMAGES = {
+    "no JSON": lambda data: "{",
+    "not a dict": lambda data: "[]",
+    "another format": lambda data: json.dumps(data | {"format": 2}),
+    "a field missing": lambda data: json.dumps({k: v for k, v in data.items() if k != "title"}),
+    "a field too many": lambda data: json.dumps(data | {"more": 1}),
+    "no verdict": lambda data: json.dumps(data | {"checks": [data["checks"][0] | {"verdict": "fine"}]}),
+    "no number": lambda data: json.dumps(data | {"checks": [data["checks"][0] | {"measured": None}]}),
+    "no text": lambda data: json.dumps(data | {"title": 3}),
+    "another figure": lambda data: json.dumps(data | {"id": "F-2"}),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_record_is_noticed(tmp_path, damage):
+    folder = tmp_path / "F-1"
+    folder.mkdir()
+    record.write(found("F-1", "reproduced"), folder)
+    path = folder / record.NAME
+    path.write_text(damage(json.loads(path.read_text())))
+    with pytest.raises(ValueError, match=r"JSON|Expecting|claims\.json"):
+        record.read(folder)
