@@ -6,7 +6,7 @@ pixels read a column as  column = replica * n + pixel,  so replicas, and the lan
 oracle, are just more columns.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -44,6 +44,13 @@ class Image(Integrals, Protocol):
         """Number of pixels."""
 
 
+class Tractable(Integrals, Protocol):
+    """Integrals that know the density of their candidates."""
+
+    def pdf(self, index: Array, x: Sample) -> Array:
+        """p_i(x) of one candidate, (N,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Pixels:
     """N integrals, one per column: `of` says which image, `index` (N,) which column of it."""
@@ -78,10 +85,20 @@ def target(at: Pixels, x: Sample) -> Array:
     return nonnegative(p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target().")
 
 
-def p_hat_from(j: Pixels, y: Sample, here: Pixels) -> Array:
+Proxy = Callable[[Pixels, Sample], Array]
+"""A density of the samples of `Pixels`, up to a factor: `target`, or `pdf`."""
+
+
+def pdf(at: Pixels, x: Sample) -> Array:
+    """p(x), checked: for integrals that also know the density of their candidates; (N,)."""
+    of: Tractable = at.of  # type: ignore[assignment]
+    return nonnegative(of.pdf(at.index, x), "the density p", "Return the density of the candidates from pdf().")
+
+
+def p_hat_from(j: Pixels, y: Sample, here: Pixels, proxy: Proxy = target) -> Array:
     """p_hat_from_j(y) = p_hat_j(T_j^-1(y)) |dT_j^-1/dy|, 0 where undefined; (N,).  [GRIS Eq. 35]
 
     The factor "y in T_j(supp X_j)" is in p_hat_j, whose support lies inside supp X_j.
     """
     back = here.of.shift(y, here.index, j)
-    return back.J * target(j, back.x)
+    return back.J * proxy(j, back.x)

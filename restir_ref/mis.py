@@ -15,6 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from restir_ref.batch import Array, ratio, total
+from restir_ref.integrals import Proxy, target
 
 Density = Callable[[int], Array]
 
@@ -119,11 +120,14 @@ class Weights:
     """Resampling weights m_i with the contribution weights c_i that go with them.  [GRIS Eq. 16-21]
 
     `c` is None where c_i = m_i.  `unbiased_for` says for which inputs the pair is exactly unbiased.
+    `proxy` is the density that q compares: p_hat, or `pdf` where all inputs have known densities
+    [GRIS 5.6, tractable PDFs].
     """
 
     m: Mis
     c: Mis | None = None
     unbiased_for: str = ANY
+    proxy: Proxy = target
 
 
 WEIGHTS: Mapping[str, Weights] = MappingProxyType(

@@ -13,7 +13,7 @@ import numpy as np
 from restir_ref.batch import Array, pick, ratio, total
 from restir_ref.chance import Chance
 from restir_ref.guards import nonnegative, per_column
-from restir_ref.integrals import Pixels, Reservoirs, Sample, Shifted, p_hat_from, target
+from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, p_hat_from, target
 from restir_ref.mis import CANONICAL_COVERS, Confidences, Density, Weights
 
 LARGEST_CONFIDENCE = 2.0**100
@@ -51,10 +51,11 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
     c = _confidences(inputs, here, mis)
     for i, source in enumerate(inputs):
         y = _shifted(source, here)
-        q = _densities(i, y, inputs, here)
+        p_hat = target(here, y.x)
+        q = _densities(i, y, p_hat, inputs, here, mis.proxy)
         m = mis.m(i, q, c)
         c_over_m = None if mis.c is None else ratio(mis.c(i, q, c), m)
-        yield Candidate(y.x, q(-1), m * source.X.W * y.J, c_over_m)
+        yield Candidate(y.x, p_hat, m * source.X.W * y.J, c_over_m)
 
 
 def contribution_weight(y: Candidate) -> Array:
@@ -88,6 +89,18 @@ def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservo
     return Reservoirs(pick([each.x for each in offered], s), W, np.broadcast_to(c, W.shape))
 
 
+def select_any(ys: Sequence[Sample], cW: Sequence[Array], w: Sequence[Array], chance: Chance, c: Array) -> Reservoirs:
+    """W_Y = c_s W_s J_s (sum_j w_j / w_s) for *any* w_i > 0: the general form.  [GRIS Eq. 16]
+
+    cW holds c_i W_i J_i, where the contribution weights c_i sum to 1 over the inputs that can realise
+    y [GRIS Eq. 17]; w (M, N) must be positive wherever c_i W_i J_i f is not 0.  `select` is the case
+    w_i = p_hat m_i W_i J_i.
+    """
+    s = chance.choose(np.stack(w))
+    W = pick(cW, s) * ratio(total(w), pick(w, s))
+    return Reservoirs(pick(ys, s), W, np.broadcast_to(c, W.shape))
+
+
 def gris(inputs: Sequence[Input], here: Pixels, mis: Weights, chance: Chance) -> Reservoirs:
     """One pass of generalised RIS: weigh, then select; confidences add up.  [GRIS Eq. 19-22, 6.2]"""
     chosen = list(weigh(inputs, here, mis))
@@ -101,21 +114,20 @@ def _shifted(source: Input, here: Pixels) -> Shifted:
     return source.at.of.shift(source.X.x, source.at.index, here)
 
 
-def _densities(i: int, y: Shifted, inputs: Sequence[Input], here: Pixels) -> Density:
-    """q(j) = p_hat_from_j(Y_i), computed when first asked for; q(-1) = p_hat(Y_i).
+def _densities(i: int, y: Shifted, p_hat: Array, inputs: Sequence[Input], here: Pixels, proxy: Proxy) -> Density:
+    """q(j) = p_hat_from_j(Y_i), computed when first asked for; p_hat is that of `here`.
 
     The own density needs no shift back: T_i^-1(Y_i) = X_i and |dT_i^-1| = 1 / J_i.
     """
 
     @cache
     def q(j: int) -> Array:
-        if j == -1:
-            return target(here, y.x)
-        if inputs[j].at is here:
-            return q(-1)
+        at = inputs[j].at
+        if at is here:
+            return p_hat if proxy is target else proxy(here, y.x)
         if j == i:
-            return ratio(target(inputs[i].at, inputs[i].X.x), y.J)
-        return p_hat_from(inputs[j].at, y.x, here)
+            return ratio(proxy(at, inputs[i].X.x), y.J)
+        return p_hat_from(at, y.x, here, proxy)
 
     return q
 

@@ -20,9 +20,10 @@ M_CAP = 20
 """Default cap M_c on the confidence of history.  [GRIS 8.3]"""
 
 
-def initial(here: Pixels, chance: Chance) -> Reservoirs:
-    """Resample the initial candidates into one sample of confidence 1.  [GRIS Eq. 5-6; 6.3 step 1]"""
-    return resample(here.of.candidates(here.index, chance), here, chance)
+def initial(here: Pixels, chance: Chance, M: int = 1) -> Reservoirs:
+    """RIS: resample M independent sets of candidates into one sample of confidence 1.  [GRIS Eq. 1-6; 6.3]"""
+    drawn = ((x, mW / M) for _ in range(M) for x, mW in here.of.candidates(here.index, chance))
+    return resample(drawn, here, chance)
 
 
 def resample(drawn: Iterable[tuple[Sample, Array]], here: Pixels, chance: Chance) -> Reservoirs:

@@ -61,6 +61,11 @@ class Line:
         i = index % self.n
         return np.where((x >= self.low[i]) & (x < self.high[i]), self.f(i, x), 0.0)
 
+    def pdf(self, index: Array, x: Array) -> Array:
+        """p = 1 / (high - low) inside the domain, 0 outside."""
+        i = index % self.n
+        return np.where((x >= self.low[i]) & (x < self.high[i]), 1 / (self.high - self.low)[i], 0.0)
+
     def contribution(self, index: Array, x: Array) -> Array:
         """f_i(x), shape (1, N)."""
         return self.target(index, x)[None]

@@ -88,6 +88,10 @@ class Frame:
         """p_hat_i(x)."""
         return self.cells.p_hat[self.ids(index), x]
 
+    def pdf(self, index: Array, x: Array) -> Array:
+        """Density of the candidates of a frame with one technique."""
+        return np.asarray(self.cells.pdf[0, self.ids(index), x])
+
     def contribution(self, index: Array, x: Array) -> Array:
         """f_i(x), shape (1, N)."""
         return self.cells.f[None, self.ids(index), x]

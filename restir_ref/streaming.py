@@ -1,0 +1,47 @@
+"""Streaming reservoirs: resampling in constant memory, one candidate after the other.  [Chao 1982; GRIS 2.1]
+
+The result has exactly the distribution of `resampling.select`; only the stored candidates differ.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from restir_ref.batch import Array, ratio, where
+from restir_ref.chance import Chance
+from restir_ref.integrals import Reservoirs
+from restir_ref.resampling import Candidate
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The candidate kept so far and the sum of all weights seen; w_sum (N,)."""
+
+    kept: Candidate
+    w_sum: Array
+
+
+def offer(stream: Stream, new: Candidate, chance: Chance) -> Stream:
+    """Add w to w_sum *first*, then keep the new candidate with probability w / w_sum."""
+    w = new.p_hat * new.mW
+    replaced = chance.choose(np.stack(np.broadcast_arrays(stream.w_sum, w))) == 1
+    return Stream(where(replaced, new, stream.kept), stream.w_sum + w)
+
+
+def select_streaming(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservoirs:
+    """As `resampling.select`, without holding more than one candidate.  [GRIS Eq. 21-22]
+
+    Raises ValueError for no candidates.
+    """
+    stream = None
+    for new in candidates:
+        stream = Stream(new, new.p_hat * new.mW) if stream is None else offer(stream, new, chance)
+    if stream is None:
+        raise ValueError(
+            "resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input."
+        )
+    W = ratio(stream.w_sum, stream.kept.p_hat)
+    if stream.kept.c_over_m is not None:
+        W = W * stream.kept.c_over_m
+    return Reservoirs(stream.kept.x, W, np.broadcast_to(c, W.shape))
