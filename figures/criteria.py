@@ -55,8 +55,8 @@ def equal_to(value: ArrayLike, target: ArrayLike, tol: float = 1e-12) -> Outcome
     size = float(np.max(np.abs(t), initial=0.0))
     passed = bool(v.shape == t.shape and deviation <= tol * size)
     if v.ndim == t.ndim == 0:
-        return Outcome(float(v), f"= {float(t):.10g} (relative {tol:g})", passed)
-    return Outcome(deviation / (size or 1.0), f"largest relative deviation <= {tol:g}", passed)
+        return Outcome(float(v), f"= {float(t):.10g} to a relative {tol:g}", passed)
+    return Outcome(deviation / (size or 1.0), f"largest relative deviation ≤ {tol:g}", passed)
 
 
 def slope(x: ArrayLike, y: ArrayLike) -> float:
@@ -73,7 +73,7 @@ def slope_within(
     """|slope of log y over log x - target| <= tol, from at least `points` abscissae spanning `decades`."""
     s, log_x = slope(x, y), _log10(x)
     enough = len(np.unique(log_x)) >= points and bool(np.ptp(log_x) >= decades - 1e-9)
-    rule = f"log-log slope {target:g} ± {tol:g} (>= {points} points over >= {decades:g} decades)"
+    rule = f"log-log slope {target:g} ± {tol:g}, ≥ {points} points over ≥ {decades:g} decades"
     return Outcome(s, rule, bool(enough and abs(s - target) <= tol))
 
 
@@ -82,14 +82,14 @@ def unbiased(estimates: ArrayLike, reference: float, eps: float = 0.005, replica
     e = np.asarray(estimates, dtype=float)
     bias, error, text = _bias(e, reference)
     passed = abs(bias) <= 4 * error and error <= eps * abs(reference) and e.size >= replicates
-    return Outcome(text, f"|bias| <= 4 SE, SE <= {eps:.3g} of the truth, R >= {replicates}", bool(passed))
+    return Outcome(text, f"|bias| ≤ 4 SE, SE ≤ {eps:.3g} of the truth, R ≥ {replicates}", bool(passed))
 
 
 def biased(estimates: ArrayLike, reference: float, low: float, high: float) -> Outcome:
     """|mean - reference| >= 8 SE and the relative bias lies in [low, high]: for what must be wrong; (R,)."""
     bias, error, text = _bias(np.asarray(estimates, dtype=float), reference)
     passed = abs(bias) >= 8 * error and abs(bias) > 0 and low <= bias / reference <= high
-    return Outcome(text, f"|bias| >= 8 SE, relative bias in [{low:g}, {high:g}]", bool(passed))
+    return Outcome(text, f"|bias| ≥ 8 SE, relative bias in [{low:g}, {high:g}]", bool(passed))
 
 
 def ratio_below(errors: ArrayLike, others: ArrayLike, limit: float) -> Outcome:

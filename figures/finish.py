@@ -3,7 +3,7 @@
 import traceback
 from collections.abc import Mapping, Sequence
 
-from figures import disk, record, store
+from figures import disk, record, store, style
 from figures.figure import Arrays, Claim, undeclared, verdict_line
 from figures.ledger import Row
 from figures.plan import Plan, arrays_path, key, read_chunks
@@ -46,8 +46,6 @@ def judged(plan: Plan, arrays: Arrays) -> Sequence[Claim]:
 
 def drawn(plan: Plan, arrays: Arrays, claims: Sequence[Claim]) -> dict[str, bytes]:
     """The picture as PNG and PDF, each with the verdicts at its foot."""
-    from figures import style  # noqa: PLC0415  matplotlib is heavy, and listing figures does not need it
-
     lines = [verdict_line(claim) for claim in claims]
     with style.context():
         picture = plan.figure.draw(arrays)

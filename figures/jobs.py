@@ -15,6 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
+from multiprocessing import resource_tracker
 from typing import Any, ParamSpec, TypeVar
 from zlib import crc32
 
@@ -78,6 +79,21 @@ class SerialExecutor(Executor):
         return future
 
 
+class Workers(ProcessPoolExecutor):
+    """Spawned processes. Ctrl-C is blocked while they may be born: they inherit the block, it is not for them."""
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Queue the call; this is where a pool starts its processes."""
+        if not hasattr(signal, "pthread_sigmask"):
+            return super().submit(fn, *args, **kwargs)
+        resource_tracker.ensure_running()  # it would lift the block if it had to be started below
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def cores() -> int:
     """The cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -88,7 +104,7 @@ def executor(jobs: int) -> Executor:
     if jobs == 1:
         return SerialExecutor()
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(jobs, mp_context=context, initializer=_worker)
+    return Workers(jobs, mp_context=context, initializer=_worker)
 
 
 @contextmanager

@@ -1,17 +1,21 @@
-"""One look for all figures: readable without colour, drawn without pyplot, the same on every machine."""
+"""One look for all figures: readable without colour, drawn without pyplot, the same on every machine.
+
+Matplotlib is imported when something is drawn: workers and listings do without.
+"""
+# ruff: noqa: PLC0415
 
 import io
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
-import matplotlib as mpl
 import numpy as np
 from cycler import cycler
-from matplotlib.figure import Figure as Picture
-from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
 
 # Okabe and Ito's colour-blind safe palette, ordered so that neighbours also differ in lightness.
 COLOURS = ("#0072B2", "#E69F00", "#000000", "#D55E00", "#56B4E9", "#009E73", "#CC79A7")
@@ -49,7 +53,7 @@ FOOT: dict[str, Any] = {
     "linespacing": 1.3,
     "parse_math": False,
 }
-LINE_INCHES = 0.15
+LINE_INCHES = 0.138
 
 METADATA: dict[str, dict[str, Any]] = {"png": {"Software": None}, "pdf": {"CreationDate": None}}
 
@@ -57,6 +61,8 @@ METADATA: dict[str, dict[str, Any]] = {"png": {"Software": None}, "pdf": {"Creat
 @contextmanager
 def context() -> Iterator[None]:
     """The style, on top of matplotlib's own defaults: no user's matplotlibrc leaks into a figure."""
+    import matplotlib as mpl
+
     with mpl.rc_context():
         mpl.rcdefaults()
         cast(dict[str, Any], mpl.rcParams).update(RC)
@@ -65,20 +71,24 @@ def context() -> Iterator[None]:
 
 def panels(
     rows: int = 1, columns: int = 1, width: float = 3.6, height: float = 2.9
-) -> tuple[Picture, NDArray[np.object_]]:
+) -> tuple["Picture", NDArray[np.object_]]:
     """A picture and its (rows, columns) axes, `width` x `height` inches each.
 
     `fig, ax = panels(1, 2)`, then `ax[0, 1].loglog(n, variance, label="Talbot")`: `ax` is always a 2D array.
     """
+    from matplotlib.figure import Figure as Picture
+
     picture = Picture(figsize=(width * columns, height * rows), layout="constrained")
     return picture, picture.subplots(rows, columns, squeeze=False)
 
 
-def render(picture: Picture, lines: Sequence[str], kind: str) -> bytes:
+def render(picture: "Picture", lines: Sequence[str], kind: str) -> bytes:
     """The picture as a file with `lines` at its foot, which hangs below so that no layout is disturbed.
 
     The same picture gives the same bytes: whatever depends on the time is left out.
     """
+    from matplotlib.transforms import Bbox
+
     width, height = picture.get_size_inches()
     text = "\n".join(wrapped(lines, width))
     depth = LINE_INCHES * (text.count("\n") + 1) + 0.1

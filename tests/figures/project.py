@@ -1,12 +1,16 @@
 """Projects made for one test: a ledger, a folder of tests, and figures of `tests.figures.demos`."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from figures.cli import main
 from figures.registry import ROOT, Project
+from tests.figures.demos.stuck import STUCK
 
 
 def claim(id_="DEMO-C01", quick="reproduced", paper=None):
@@ -37,11 +41,18 @@ def figures(here, *words):
     return main([str(word) for word in words], here)
 
 
-def started(here, *words):
-    """The command in a process of its own, under way."""
+@contextmanager
+def stuck(here, *words):
+    """The command in a process group of its own, under way, with `demos.stuck` stuck; nothing of it stays."""
     command = [sys.executable, "-m", "tests.figures.project", str(here.ledger.parent), ",".join(here.modules)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen([*command, *map(str, words)], cwd=ROOT, **pipes)
+    place = {"cwd": ROOT, "env": os.environ | {STUCK: "1"}, "start_new_session": True}
+    with subprocess.Popen([*command, *map(str, words)], **place, **pipes) as run:
+        try:
+            yield run
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(run.pid, signal.SIGKILL)
 
 
 def arrays(out):

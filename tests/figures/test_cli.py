@@ -65,6 +65,13 @@ def test_all_cores_may_be_asked_for(tmp_path, jobs):
     assert figures(here, "run", "--jobs", jobs, "--out", tmp_path / "out") == 0
 
 
+@pytest.mark.parametrize(("mode", "words"), [("bar", "3/3"), ("log", "chunk 3 of 3"), ("auto", "chunk 3 of 3")])
+def test_progress_is_a_bar_or_lines(tmp_path, capsys, mode, words):
+    here = project(tmp_path, "sound")
+    assert figures(here, "run", "--progress", mode, "--out", tmp_path / "out") == 0
+    assert words in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", ["list", "run", "report", "ledger"])
 def test_every_command_explains_itself(command, capsys):
     with pytest.raises(SystemExit, match="0"):
@@ -184,6 +191,11 @@ def test_a_claim_the_ledger_lacks_is_named_with_its_figure(tmp_path, capsys):
     said = refused(capsys, here, "run", "--out", tmp_path / "out")
     assert "demos.sound: DEMO-F01 declares claim 'DEMO-C01'" in said
     assert "demos.sound: DEMO-F01 declares claim 'DEMO-C01'" in refused(capsys, here, "ledger")
+
+
+def test_listing_and_workers_do_without_matplotlib():
+    code = "import sys, figures.cli, tests.figures.demos.sound; print('matplotlib' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], cwd=ROOT, text=True).strip() == "False"
 
 
 def test_a_missing_ledger_is_named(tmp_path, capsys):

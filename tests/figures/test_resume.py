@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.figures.demos import sound
-from tests.figures.project import arrays, figures, project, started
+from tests.figures.project import arrays, figures, project, stuck
 
 PATIENCE = 60  # seconds until a process that hangs is a failure
 
@@ -22,20 +23,25 @@ def until(condition):
         time.sleep(0.01)
 
 
-def interrupted(here, sign, *words):
-    """A run to which a signal is sent once some chunks stand there, and what it said; `--out` comes last."""
-    run = started(here, *words)
-    until(lambda: len(list(words[-1].rglob("chunks/*.npz"))) >= 3)
-    run.send_signal(sign)
-    said = run.communicate(timeout=PATIENCE)
-    return run.returncode, said[1]
+def interrupted(here, stop, *words):
+    """The status and words of a run that is stopped once five chunks stand there; `--out` comes last."""
+    with stuck(here, *words) as run:
+        until(lambda: len(list(words[-1].rglob("chunks/*.npz"))) == 5)
+        stop(run)
+        _, said = run.communicate(timeout=PATIENCE)
+    return run.returncode, said
+
+
+def ctrl_c(run):
+    """What a terminal does: the signal goes to the run and to its workers."""
+    os.killpg(run.pid, signal.SIGINT)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """A project with a slow figure, and the arrays of its uninterrupted run."""
-    place = tmp_path_factory.mktemp("slow")
-    here = project(place, "slow", "sound")
+    """A project with a figure that may be stuck, and the arrays of its uninterrupted run."""
+    place = tmp_path_factory.mktemp("whole")
+    here = project(place, "stuck", "sound")
     assert figures(here, "run", "--jobs", 2, "--out", place / "whole") == 0
     return here, arrays(place / "whole")
 
@@ -56,10 +62,10 @@ def test_another_seed_stores_something_else(tmp_path, whole):
 def test_after_kill_9_the_same_command_goes_on_and_ends_in_the_same_bytes(tmp_path, whole, jobs):
     here, expected = whole
     words = ("run", "--jobs", jobs, "--out", tmp_path)
-    status, _ = interrupted(here, signal.SIGKILL, *words)
+    status, _ = interrupted(here, subprocess.Popen.kill, *words)
     assert status == -signal.SIGKILL
     before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("chunks/*.npz")}
-    assert 3 <= len(before) < len(expected) - 2
+    assert len(before) == 5
     assert figures(here, *words) == 0
     assert arrays(tmp_path) == expected
     assert all(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
@@ -69,7 +75,7 @@ def test_after_kill_9_the_same_command_goes_on_and_ends_in_the_same_bytes(tmp_pa
 def test_ctrl_c_is_answered_clearly_and_loses_nothing(tmp_path, whole):
     here, expected = whole
     words = ("run", "--jobs", 2, "--out", tmp_path)
-    status, said = interrupted(here, signal.SIGINT, *words)
+    status, said = interrupted(here, ctrl_c, *words)
     assert status == 130
     assert "the same command goes on from there" in said
     assert "Traceback" not in said
@@ -80,13 +86,12 @@ def test_ctrl_c_is_answered_clearly_and_loses_nothing(tmp_path, whole):
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc to see child processes")
 def test_no_worker_outlives_a_killed_run(tmp_path, whole):
-    run = started(whole[0], "run", "--preset", "paper", "--jobs", 2, "--out", tmp_path)
-    until(lambda: list(tmp_path.rglob("chunks/*.npz")))
-    children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
-    run.kill()
-    run.communicate(timeout=PATIENCE)
-    assert len(children) >= 2
-    until(lambda: not any(alive(child) for child in children))
+    with stuck(whole[0], "run", "--jobs", 2, "--out", tmp_path) as run:
+        until(lambda: list(tmp_path.rglob("chunks/*.npz")))
+        children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+        assert len(children) >= 2
+        run.kill()
+        until(lambda: not any(alive(child) for child in children))
 
 
 def alive(pid):
