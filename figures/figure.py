@@ -55,7 +55,7 @@ class Figure:
     """A figure of a paper: its name, the claims it checks, and the pure functions that make it.
 
     `presets` maps "quick" and "paper" to plain JSON data, which the functions receive as dicts and lists.
-    Raise `version` whenever `chunks` or `compute` changes: stored chunks of another version are refused.
+    Chunks of older code are computed again by themselves; raise `version` to have stored chunks refused instead.
     """
 
     id: str

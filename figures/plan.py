@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from figures import disk, store
+from figures import code, disk, store
 from figures.errors import FigureError
 from figures.figure import Arrays, Data, Figure
 from figures.jobs import Job
@@ -30,6 +30,7 @@ class Plan:
     parts: tuple[Data, ...]
     seed: int
     folder: Path
+    code: str
     trouble: str = ""
 
 
@@ -42,7 +43,8 @@ def plan(entry: Entry, preset: str, seed: int, out: Path) -> Plan:
         parts = tuple(_round_trip(part) for part in figure.chunks(data))
     except Exception:
         trouble = traceback.format_exc()
-    return Plan(entry.module, figure, preset, data, parts, seed, out / figure.id, trouble)
+    made_by = code.digest(entry.module, figure.world)
+    return Plan(entry.module, figure, preset, data, parts, seed, out / figure.id, made_by, trouble)
 
 
 def _round_trip(data: Any) -> Any:
@@ -70,6 +72,7 @@ def _identity(plan: Plan) -> dict[str, Any]:
         "format": FORMAT,
         "figure": plan.figure.id,
         "version": plan.figure.version,
+        "code": plan.code,
         "preset": plan.preset,
         "data": plan.data,
         "chunks": len(plan.parts),
@@ -90,7 +93,8 @@ def arrays_path(plan: Plan) -> Path:
 def prepare(plan: Plan, warn: Callable[[str], object]) -> set[int]:
     """Make the folder, clean up after killed runs, set damaged chunks aside; return the missing numbers.
 
-    A file of another run or program is an error: it is neither used nor overwritten.
+    A file of another run or program is an error: it is neither used nor overwritten.  One that differs in nothing
+    but the code that made it is computed again.
     """
     _make(plan.folder / "chunks")
     found = {n: store.state(chunk_path(plan, n), chunk_key(plan, n)) for n in range(len(plan.parts))}
@@ -101,6 +105,9 @@ def prepare(plan: Plan, warn: Callable[[str], object]) -> set[int]:
         )
     for path, trouble in ((chunk_path(plan, n), text) for n, (s, text) in found.items() if s == "damaged"):
         warn(f"{path} is damaged ({trouble}): set aside as {disk.set_aside(path).name}, computed again")
+    stale = [number for number, (state, _) in found.items() if state == "stale"]
+    if stale:
+        warn(f"{plan.figure.id}: the code has changed since {len(stale)} of its chunks were computed: computed again")
     return {number for number, (state, _) in found.items() if state != "ours"}
 
 

@@ -26,7 +26,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the date of every zip member: bytes must not de
 # What reading a broken zip or array can raise; zlib and struct errors come with a bad header.
 UNREADABLE = (OSError, ValueError, EOFError, KeyError, RuntimeError, MemoryError, BadZipFile, zlib.error)
 
-State = Literal["absent", "ours", "damaged", "foreign"]
+State = Literal["absent", "ours", "stale", "damaged", "foreign"]
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,8 @@ def _judged(arrays: Arrays, key: str) -> Stored:
     found = arrays.pop(KEY, np.array([]))
     if found.dtype.kind != "U" or found.shape != (2,):
         return Stored("foreign", {}, "it carries no key, so it was not written by this program")
+    if found[0] != key and differing(str(found[0]), key) == ["code"]:
+        return Stored("stale", {}, "other code computed it")
     if found[0] != key:
         return Stored("foreign", {}, difference(str(found[0]), key))
     if found[1] != digest(arrays):
@@ -140,12 +142,20 @@ def _read_member(archive: zipfile.ZipFile, name: str) -> Any:
 
 def difference(found: str, wanted: str) -> str:
     """In what two keys differ, field by field, in words."""
+    fields = differing(found, wanted)
+    if not fields:
+        return "its key is not one of this program's"
+    old, new = json.loads(found), json.loads(wanted)
+    return "; ".join(f"{f} is {_short(old.get(f))} there and {_short(new.get(f))} now" for f in fields)
+
+
+def differing(found: str, wanted: str) -> list[str]:
+    """The fields in which two keys differ; none if either is no key of ours."""
     try:
         old, new = json.loads(found), json.loads(wanted)
-        fields = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
+        return sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
     except (ValueError, AttributeError, TypeError):
-        return "its key is not one of this program's"
-    return "; ".join(f"{f} is {_short(old.get(f))} there and {_short(new.get(f))} now" for f in fields)
+        return []
 
 
 def _short(value: Any) -> str:
