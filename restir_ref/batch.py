@@ -57,9 +57,9 @@ def pick(batches: Sequence[Batch], s: Array) -> Batch:
     chosen = [s == k for k in range(1, len(batches))]
 
     def picked(*leaves: Array) -> Array:
-        out = np.array(np.broadcast_to(leaves[0], (*leaves[0].shape[:-1], len(s))))
+        out = np.broadcast_to(leaves[0], (*leaves[0].shape[:-1], len(s)))
         for leaf, mask in zip(leaves[1:], chosen, strict=True):
-            np.copyto(out, leaf, where=mask)
+            out = np.where(mask, leaf, out)
         return out
 
     merged: Batch = map_leaves(picked, *batches)
@@ -68,10 +68,10 @@ def pick(batches: Sequence[Batch], s: Array) -> Batch:
 
 def ratio(a: Array, b: Array) -> Array:
     """a / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples."""
-    defined = np.not_equal(b, 0)
-    if defined.all():
+    null = np.equal(b, 0)
+    if not null.any():
         return np.asarray(a / b)
-    return np.where(defined, a / np.where(defined, b, 1), 0)
+    return np.asarray(a / (b + null) * ~null)
 
 
 def total(terms: Sequence[Array]) -> Array:

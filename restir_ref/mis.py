@@ -70,7 +70,8 @@ def one_over_z(i: int, q: Density, c: Confidences) -> Array:
 
 def talbot(i: int, q: Density, c: Confidences) -> Array:
     """m_i = c_i q_i / sum_j c_j q_j, the balance heuristic over proxy densities.  [GRIS Eq. 36]"""
-    return ratio(c[i] * q(i), total([c[j] * q(j) for j in range(len(c))]))
+    shares = [c[j] * q(j) for j in range(len(c))]
+    return ratio(shares[i], total(shares))
 
 
 def pairwise(i: int, q: Density, c: Confidences) -> Array:
