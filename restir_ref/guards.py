@@ -21,10 +21,12 @@ def nonnegative(values: Array, what: str, remedy: str) -> Array:
 
 
 def per_column(values: Array, n: int, what: str) -> Array:
-    """Return `values` if its last axis has n columns (or 1, or none, to broadcast).
+    """Return `values` (n,), or one value to broadcast.
 
     Raises ValueError naming both shapes.
     """
-    if values.ndim == 0 or values.shape[-1] in (1, n):
+    if values.shape in ((n,), (1,), ()):
         return values
-    raise ValueError(f"{what} has shape {values.shape}, but this batch has {n} columns: the last axis must be {n}.")
+    raise ValueError(
+        f"{what} has shape {values.shape}, but this batch has {n} columns: the last axis must be {n}, and the only one."
+    )

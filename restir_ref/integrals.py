@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.guards import nonnegative, per_column
@@ -81,7 +83,7 @@ class Reservoirs:
 
 def target(at: Pixels, x: Sample) -> Array:
     """p_hat(x) of the integrals `at`, checked: (N,), finite and >= 0."""
-    p_hat = per_column(at.of.target(at.index, x), len(at.index), "the target p_hat")
+    p_hat = per_column(np.asarray(at.of.target(at.index, x)), len(at.index), "the target p_hat")
     return nonnegative(p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target().")
 
 
@@ -92,7 +94,16 @@ Proxy = Callable[[Pixels, Sample], Array]
 def pdf(at: Pixels, x: Sample) -> Array:
     """p(x), checked: for integrals that also know the density of their candidates; (N,)."""
     of: Tractable = at.of  # type: ignore[assignment]
-    return nonnegative(of.pdf(at.index, x), "the density p", "Return the density of the candidates from pdf().")
+    p = per_column(np.asarray(of.pdf(at.index, x)), len(at.index), "the density p")
+    return nonnegative(p, "the density p", "Return the density of the candidates from pdf().")
+
+
+def shifted(x: Sample, at: Pixels, to: Pixels) -> Shifted:
+    """y = T(x) from the domains of `at` to those of `to`; J is checked: (N,), finite and >= 0."""
+    y = at.of.shift(x, at.index, to)
+    J = per_column(np.asarray(y.J), len(to.index), "the Jacobian J")
+    nonnegative(J, "the Jacobian J", "Return |dT/dx| from shift(), its absolute value, and 0 where T is undefined.")
+    return y
 
 
 def p_hat_from(j: Pixels, y: Sample, here: Pixels, proxy: Proxy = target) -> Array:
@@ -100,5 +111,5 @@ def p_hat_from(j: Pixels, y: Sample, here: Pixels, proxy: Proxy = target) -> Arr
 
     The factor "y in T_j(supp X_j)" is in p_hat_j, whose support lies inside supp X_j.
     """
-    back = here.of.shift(y, here.index, j)
+    back = shifted(y, here, j)
     return back.J * proxy(j, back.x)

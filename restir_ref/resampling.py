@@ -13,7 +13,7 @@ import numpy as np
 from restir_ref.batch import Array, pick, ratio, total
 from restir_ref.chance import Chance
 from restir_ref.guards import nonnegative, per_column
-from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, p_hat_from, target
+from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, p_hat_from, shifted, target
 from restir_ref.mis import CANONICAL_COVERS, Confidences, Density, Weights
 
 LARGEST_CONFIDENCE = 2.0**100
@@ -71,16 +71,7 @@ def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservo
     infinite weights.
     """
     offered = list(candidates)
-    if not offered:
-        raise ValueError(
-            "resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input."
-        )
-    w = np.stack(np.broadcast_arrays(*(each.p_hat * each.mW for each in offered)))
-    nonnegative(
-        w,
-        "a resampling weight w_i = p_hat m_i W_i",
-        "Check the m W of the candidates and the MIS weights m_i.",
-    )
+    w = _resampling_weights([each.p_hat * each.mW for each in offered])
     s = chance.choose(w)
     W = ratio(w.sum(axis=0), pick([each.p_hat for each in offered], s))
     corrections = [each.c_over_m for each in offered if each.c_over_m is not None]
@@ -96,7 +87,7 @@ def select_any(ys: Sequence[Sample], cW: Sequence[Array], w: Sequence[Array], ch
     y [GRIS Eq. 17]; w (M, N) must be positive wherever c_i W_i J_i f is not 0.  `select` is the case
     w_i = p_hat m_i W_i J_i.
     """
-    s = chance.choose(np.stack(w))
+    s = chance.choose(_resampling_weights(w))
     W = pick(cW, s) * ratio(total(w), pick(w, s))
     return Reservoirs(pick(ys, s), W, np.broadcast_to(c, W.shape))
 
@@ -107,11 +98,29 @@ def gris(inputs: Sequence[Input], here: Pixels, mis: Weights, chance: Chance) ->
     return select(chosen, chance, np.minimum(total([each.X.c for each in inputs]), LARGEST_CONFIDENCE))
 
 
+def resampling_weight(w: Array) -> Array:
+    """w_i = p_hat m_i W_i, checked: finite and >= 0."""
+    return nonnegative(
+        w,
+        "a resampling weight w_i = p_hat m_i W_i",
+        "Check the m W of the candidates and the MIS weights m_i.",
+    )
+
+
+def _resampling_weights(w: Sequence[Array]) -> Array:
+    """All w_i, (M, N), checked; at least one."""
+    if not w:
+        raise ValueError(
+            "resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input."
+        )
+    return resampling_weight(np.stack(np.broadcast_arrays(*w)))
+
+
 def _shifted(source: Input, here: Pixels) -> Shifted:
     """Y_i = T_i(X_i); the identity for canonical inputs."""
     if source.at is here:
         return Shifted(source.X.x, ONE)
-    return source.at.of.shift(source.X.x, source.at.index, here)
+    return shifted(source.X.x, source.at, here)
 
 
 def _densities(i: int, y: Shifted, p_hat: Array, inputs: Sequence[Input], here: Pixels, proxy: Proxy) -> Density:

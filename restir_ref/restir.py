@@ -12,6 +12,7 @@ import numpy as np
 
 from restir_ref.batch import Array, take, total
 from restir_ref.chance import Chance
+from restir_ref.guards import nonnegative, per_column
 from restir_ref.integrals import Pixels, Reservoirs, Sample, target
 from restir_ref.mis import WEIGHTS, Weights
 from restir_ref.resampling import Candidate, Input, contribution_weight, gris, select, weigh
@@ -28,8 +29,13 @@ def initial(here: Pixels, chance: Chance, M: int = 1) -> Reservoirs:
 
 def resample(drawn: Iterable[tuple[Sample, Array]], here: Pixels, chance: Chance) -> Reservoirs:
     """RIS over candidates (x, m W), W = 1/p; list them first to share them between integrals."""
-    offered = (Candidate(x, target(here, x), mW) for x, mW in drawn)
+    offered = (Candidate(x, target(here, x), _checked(mW, len(here.index))) for x, mW in drawn)
     return select(offered, chance, np.ones(len(here.index), dtype=int))
+
+
+def _checked(mW: Array, n: int) -> Array:
+    """The m W of candidates (n,), finite and >= 0, whether their target is 0 or not."""
+    return nonnegative(per_column(mW, n, "the m W of a candidate"), "the m W of a candidate", "Yield m_i / p(x).")
 
 
 def temporal(

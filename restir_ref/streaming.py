@@ -11,7 +11,7 @@ import numpy as np
 from restir_ref.batch import Array, ratio, where
 from restir_ref.chance import Chance
 from restir_ref.integrals import Reservoirs
-from restir_ref.resampling import Candidate
+from restir_ref.resampling import Candidate, resampling_weight
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Stream:
 
 def offer(stream: Stream, new: Candidate, chance: Chance) -> Stream:
     """Add w to w_sum *first*, then keep the new candidate with probability w / w_sum."""
-    w = new.p_hat * new.mW
+    w = resampling_weight(new.p_hat * new.mW)
     replaced = chance.choose(np.stack(np.broadcast_arrays(stream.w_sum, w))) == 1
     return Stream(where(replaced, new, stream.kept), stream.w_sum + w)
 
@@ -36,7 +36,7 @@ def select_streaming(candidates: Iterable[Candidate], chance: Chance, c: Array) 
     """
     stream = None
     for new in candidates:
-        stream = Stream(new, new.p_hat * new.mW) if stream is None else offer(stream, new, chance)
+        stream = Stream(new, resampling_weight(new.p_hat * new.mW)) if stream is None else offer(stream, new, chance)
     if stream is None:
         raise ValueError(
             "resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input."

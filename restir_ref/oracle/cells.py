@@ -11,6 +11,7 @@ import numpy as np
 
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
+from restir_ref.guards import nonnegative
 from restir_ref.integrals import Pixels, Shifted
 
 
@@ -41,6 +42,8 @@ def cells(
 
     Raises ValueError where a density does not integrate to 1 or a shift has no inverse.
     """
+    for what, table in (("volume v", v), ("density pdf", pdf), ("integrand f", f)):
+        nonnegative(table, f"the {what}", "Columns here are cells.")
     mass = (pdf * v).sum(axis=-1)
     if not np.allclose(np.asarray(mass, dtype=float), 1):
         raise ValueError(
