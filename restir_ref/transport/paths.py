@@ -1,0 +1,233 @@
+"""Path tracing as a pure function of primary samples: trees, their leaves, and the path record.  [GRIS 7.6, 8]
+
+x_0 is on the sensor, x_1 the first hit; a path scatters at x_1 .. x_k and ends on a light x_(k+1),
+found by light sampling (NEE) or by a BSDF sample.  Each end of a tree is a leaf (k, nee), a part of
+its own of the disjoint union of primary sample spaces, so the candidate density is 1.  The
+integrand is F = omega f / p.
+
+Primary numbers: the sensor's, then 2 d per vertex: lobe 1, direction d-1, light 1, light point d-1.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from restir_ref.batch import Array, ratio
+from restir_ref.transport import materials as mat
+from restir_ref.transport.materials import Vertex
+from restir_ref.transport.scene import Scene, arrive, emitted, light_pdf, sample_light, visible
+from restir_ref.transport.vectors import norm
+
+
+class Sensor(Protocol):
+    """n pixels; pixel and `numbers` primary numbers give a ray and its weight."""
+
+    @property
+    def n(self) -> int:
+        """Number of pixels."""
+
+    @property
+    def numbers(self) -> int:
+        """Primary numbers per ray."""
+
+    def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
+        """Start (d, N), direction (d, N), weight (N,)."""
+
+
+@dataclass(frozen=True)
+class Connectability:
+    """When two vertices may be connected: both lobes this rough, and this far apart.  [GRIS 7.5]
+
+    Roughness is perceptual, distance in scene units.  Delta lobes never connect.
+    """
+
+    roughness: float
+    distance: float
+
+
+RECONNECTION = Connectability(0.0, 0.0)
+REPLAY = Connectability(np.inf, 0.0)
+
+
+def connectable(rule: Connectability, r_x: Array, r_z: Array, distance: Array) -> Array:
+    """The one predicate for base path, offset path and inverse; r are roughnesses, (N,)."""
+    rough = (np.minimum(r_x, r_z) >= rule.roughness) & (r_x > 0) & (r_z > 0)
+    return rough & (distance >= rule.distance)
+
+
+@dataclass(frozen=True, eq=False)
+class Tracer:
+    """A scene seen by a sensor, up to `depth` scattering vertices, with a rule for connections."""
+
+    scene: Scene
+    sensor: Sensor
+    depth: int
+    rule: Connectability
+
+    @property
+    def D(self) -> int:
+        """Primary numbers of a path."""
+        return self.sensor.numbers + 2 * self.scene.space.d * self.depth
+
+    def lobe_number(self, u: Array, i: int) -> Array:
+        """The number that chooses the lobe at x_i, (N,)."""
+        return u[self._start(i)]
+
+    def direction_numbers(self, u: Array, i: int) -> Array:
+        """The numbers of the direction leaving x_i, (d-1, N)."""
+        start, d = self._start(i), self.scene.space.d
+        return u[start + 1 : start + d]
+
+    def light_numbers(self, u: Array, i: int) -> tuple[Array, Array]:
+        """The numbers of light sampling at x_i: pick (N,), point (d-1, N)."""
+        start, d = self._start(i), self.scene.space.d
+        return u[start + d], u[start + d + 1 : start + 2 * d]
+
+    def _start(self, i: int) -> int:
+        return self.sensor.numbers + 2 * self.scene.space.d * (i - 1)
+
+
+@dataclass(frozen=True)
+class Path:
+    """A path, evaluated, with what its shift needs.  [GRIS 8.2]
+
+    u (D, N)  primary sample; stale from the reconnection on
+    k, nee    scattering vertices, and whether the end was found by light sampling
+    c         index of the reconnection vertex x_c, 0 for pure replay
+    z, prim   x_c (d, N) and its primitive;  lobe_in, lobe_out  lobes at x_(c-1) and x_c
+    out       direction (d, N) leaving x_c;  S (C, N)  what the suffix beyond it carries
+    p_light   density (directions) of sampling the light from x_k, kept while c = k
+    A         density of x_c (area) and of `out`, as primary samples produce them; 1 for replay
+    F         omega f / p, (C, N)
+    """
+
+    u: Array
+    k: Array
+    nee: Array
+    c: Array
+    z: Array
+    prim: Array
+    lobe_in: Array
+    lobe_out: Array
+    out: Array
+    S: Array
+    p_light: Array
+    A: Array
+    F: Array
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """What happens at one vertex: lobe l and shares P, direction w (d, N), f cos / p (C, N), densities (N,)."""
+
+    lobe: Array
+    P: Array
+    w: Array
+    weight: Array
+    p: Array
+    p_all: Array
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """An end of a tree: F = T end, where bare = end without what depends on the direction arriving at x_k."""
+
+    end: Array
+    bare: Array
+    p_light: Array
+
+
+def scatter(t: Tracer, v: Vertex, u: Array, i: int) -> Scatter:
+    """Sample one lobe and a direction at x_i; densities include the lobe's probability."""
+    table, space = t.scene.materials, t.scene.space
+    P = mat.lobe_shares(table, v)
+    lobe = mat.choose_lobe(P, t.lobe_number(u, i))
+    local = mat.sample_lobe(table, space, v, lobe, t.direction_numbers(u, i))
+    lost = (local == 0).all(axis=0)
+    local[-1] = np.where(lost, 1.0, local[-1])
+    f, p = mat.evaluate_lobe(table, space, v, lobe, local)
+    P_l = P[lobe, np.arange(len(lobe))]
+    delta = mat.lobe_roughness(table, v, lobe) == 0
+    weight = np.where(lost, 0.0, ratio(f, np.where(delta, P_l, P_l * p)))
+    p_all = P_l * p if table.L == 1 else np.where(delta, 0.0, mat.evaluate_all(table, space, v, P, local)[1])
+    return Scatter(lobe, P, space.to_world(v.n, local), weight, P_l * p, p_all)
+
+
+def light_leaf(t: Tracer, v: Vertex, P: Array, u: Array, i: int) -> tuple[Leaf, Array]:
+    """Light sampling at x_i: the leaf (i, NEE) and the direction to the light.  [GRIS Eq. 49]"""
+    s = t.scene
+    light = sample_light(s, *t.light_numbers(u, i))
+    to = light.y - v.x
+    r = np.maximum(norm(to), 1e-300)
+    w = to / r
+    cos_y = -np.einsum("dn,dn->n", light.n, w)
+    f, p_all = mat.evaluate_all(s.materials, s.space, v, P, s.space.to_local(v.n, w))
+    seen = (cos_y > 0) & (f > 0).any(axis=0)
+    p_light = light.pdf_area * r ** (s.space.d - 1) / np.where(seen, cos_y, 1)
+    seen &= visible(s, v.x, light.y)
+    bare = np.where(seen, light.emission / p_light, 0)
+    return Leaf(f * bare * ratio(p_light, p_light + p_all), bare, p_light), w
+
+
+def hit_leaf(t: Tracer, v: Vertex, r: Array, at: Scatter) -> Leaf:
+    """The BSDF sample `at` has met v at distance r: the leaf (i, BSDF), zero unless v emits."""
+    bare = emitted(t.scene, v)
+    p_light = light_pdf(t.scene, v, r)
+    omega = np.where(at.p_all > 0, ratio(at.p_all, at.p_all + p_light), 1.0)  # delta lobes have no rival
+    return Leaf(bare * omega, bare, p_light)
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A traced path tree: vertices x_1 .., scattering at each, distances, leaves by kind, throughput T_i."""
+
+    u: Array
+    x: Sequence[Vertex]
+    at: Sequence[Scatter]
+    r: Sequence[Array]
+    seen: Leaf
+    lights: Sequence[tuple[Leaf, Array]]
+    hits: Sequence[Leaf]
+    T: Sequence[Array]
+
+
+def trace(t: Tracer, u: Array, pixel: Array) -> Tree:
+    """The whole tree of a primary sample u (D, N)."""
+    v, r, T = first_hit(t, u, pixel)
+    bare = emitted(t.scene, v)
+    seen = Leaf(bare, bare, np.zeros(len(pixel)))
+    vertices, scatters, distances, lights, hits, throughputs = [v], [], [r], [], [], [T]
+    for i in range(1, t.depth + 1):
+        at = scatter(t, v, u, i)
+        lights.append(light_leaf(t, v, at.P, u, i))
+        v, r, met = arrive(t.scene, v.x, at.w)
+        at = Scatter(at.lobe, at.P, at.w, at.weight * met, at.p, at.p_all)
+        T = T * at.weight
+        hits.append(hit_leaf(t, v, r, at))
+        vertices.append(v)
+        scatters.append(at)
+        distances.append(r)
+        throughputs.append(T)
+    return Tree(u, vertices, scatters, distances, seen, lights, hits, throughputs)
+
+
+def first_hit(t: Tracer, u: Array, pixel: Array) -> tuple[Vertex, Array, Array]:
+    """x_1, its distance, and the throughput (C, N) that arrives there."""
+    x, w, weight = t.sensor.ray(pixel, u[: t.sensor.numbers])
+    v, r, met = arrive(t.scene, x, w)
+    return v, r, np.broadcast_to(weight * met, (t.scene.C, len(pixel)))
+
+
+def leaves(tree: Tree) -> Iterator[tuple[int, bool, Array]]:
+    """(k, nee, F) of every leaf, F (C, N)."""
+    yield 0, False, tree.T[0] * tree.seen.end
+    for i, ((light, _), hit) in enumerate(zip(tree.lights, tree.hits, strict=True), start=1):
+        yield i, True, tree.T[i - 1] * light.end
+        yield i, False, tree.T[i] * hit.end
+
+
+def radiance(tree: Tree) -> Array:
+    """Sum of all leaves, (C, N): plain path tracing."""
+    return np.asarray(sum(F for _, _, F in leaves(tree)))

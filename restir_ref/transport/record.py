@@ -1,0 +1,130 @@
+"""From a traced tree and a chosen leaf to the path record: where it reconnects, and what its suffix carries."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from restir_ref.batch import Array
+from restir_ref.transport import materials as mat
+from restir_ref.transport.paths import Path, Tracer, Tree, connectable
+
+
+@dataclass(frozen=True)
+class Stacks:
+    """Per-vertex numbers of a tree, first axis the vertex; entry 0 is unused padding."""
+
+    x: Array
+    prim: Array
+    cos: Array
+    r: Array
+    lobe: Array
+    w: Array
+    weight: Array
+    p: Array
+
+
+def first_connectable(t: Tracer, tree: Tree) -> tuple[Array, Array]:
+    """c of every leaf (k, BSDF) and (k, NEE), each (depth + 1, N): the first index whose vertex pair connects.
+
+    A vertex is judged by the lobe that leaves it, the last vertex before light sampling by its
+    roughest lobe, a light vertex as rough; light sampling itself is replayed, not reconnected.
+    """
+    table, n = t.scene.materials, tree.u.shape[-1]
+    by_hit, by_light = np.zeros((t.depth + 1, n), dtype=int), np.zeros((t.depth + 1, n), dtype=int)
+    first, rough_before = np.zeros(n, dtype=int), np.zeros(n)
+    for i, at in enumerate(tree.at, start=1):
+        v, rough = tree.x[i - 1], mat.lobe_roughness(table, tree.x[i - 1], at.lobe)
+        if i > 1:
+            end = connectable(t.rule, rough_before, mat.roughest(table, v), tree.r[i - 1])
+            by_light[i] = np.where(first > 0, first, np.where(end, i, 0))
+            through = connectable(t.rule, rough_before, rough, tree.r[i - 1])
+            first = np.where(first > 0, first, np.where(through, i, 0))
+        on_light = connectable(t.rule, rough, np.ones(n), tree.r[i])
+        by_hit[i] = np.where(first > 0, first, np.where(on_light, i + 1, 0))
+        rough_before = rough
+    return by_hit, by_light
+
+
+def record(t: Tracer, tree: Tree, k: Array, nee: Array, F: Array) -> Path:
+    """The path record of leaf (k, nee) (N,) of each column, with contribution F (C, N)."""
+    by_hit, by_light = first_connectable(t, tree)
+    columns = np.arange(len(k))
+    c = np.where(nee, by_light[k, columns], by_hit[k, columns])
+    s = stacks(tree)
+    before = np.maximum(c - 1, 0)
+    through = (c > 0) & (c <= k) & ~(nee & (c == k))
+    lights = _stack([np.zeros_like(tree.u[: t.scene.space.d]), *(w for _, w in tree.lights)])
+    inner = np.minimum(c, t.depth)
+    out = np.where(through, _at(s.w, inner), _at(lights, k))
+    A = _at(s.p, before) * _at(s.cos, c) / _at(s.r, c) ** (t.scene.space.d - 1)
+    A = np.where(c > 0, A * np.where(through, _at(s.p, inner), 1), 1)
+    S, p_light = _suffix(t, tree, s, k, nee, c)
+    return Path(
+        tree.u,
+        k,
+        nee,
+        c,
+        _at(s.x, c),
+        _at(s.prim, c),
+        _at(s.lobe, before),
+        np.where(through, _at(s.lobe, inner), 0),
+        out,
+        S,
+        p_light,
+        A,
+        F,
+    )
+
+
+def stacks(tree: Tree) -> Stacks:
+    """Stack the tree's vertices; index i is x_i."""
+    at = tree.at
+    return Stacks(
+        _padded([v.x for v in tree.x]),
+        _padded([v.prim for v in tree.x]),
+        _padded([v.o[-1] for v in tree.x]),
+        _padded(tree.r),
+        _padded([each.lobe for each in at]),
+        _padded([each.w for each in at]),
+        _padded([each.weight for each in at]),
+        _padded([each.p for each in at]),
+    )
+
+
+def _suffix(t: Tracer, tree: Tree, s: Stacks, k: Array, nee: Array, c: Array) -> tuple[Array, Array]:
+    """S, the product of everything behind `out`, and the light density at x_k.
+
+    c < k: weights of x_(c+1) .. and the end with its MIS weight.  c = k: the bare end, whose MIS
+    weight depends on the direction arriving at x_c.  c = k + 1: 1, the light is evaluated again.
+    """
+    light_end = _padded([leaf.end for leaf, _ in tree.lights])
+    light_bare = _padded([leaf.bare for leaf, _ in tree.lights])
+    hit_end, hit_bare = _padded([leaf.end for leaf in tree.hits]), _padded([leaf.bare for leaf in tree.hits])
+    end = np.where(nee, _at(light_end, k), _at(hit_end, k))
+    bare = np.where(nee, _at(light_bare, k), _at(hit_bare, k))
+    S = np.where(c < k, end, np.where(c == k, bare, 1.0))
+    last = np.where(nee, k - 1, k)
+    for i in range(1, t.depth + 1):
+        S = S * np.where((i > c) & (i <= last), s.weight[i], 1.0)
+    p_light = np.where(
+        nee,
+        _at(_padded([leaf.p_light for leaf, _ in tree.lights]), k),
+        _at(_padded([leaf.p_light for leaf in tree.hits]), k),
+    )
+    return S, p_light
+
+
+def _stack(parts: list[Array]) -> Array:
+    return np.stack(parts)
+
+
+def _padded(parts: object) -> Array:
+    """Stack arrays with a copy of the first in front, so that index i is vertex i."""
+    listed = list(parts)  # type: ignore[call-overload]
+    return np.stack([listed[0], *listed])
+
+
+def _at(stack: Array, i: Array) -> Array:
+    """stack[i[n], ..., n] for every column n."""
+    index = np.broadcast_to(i, (1, *stack.shape[1:]))
+    return np.take_along_axis(stack, index, axis=0)[0]

@@ -1,0 +1,51 @@
+"""Path space as integrals: what ReSTIR PT plugs into the passes.  [GRIS 8]"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from restir_ref.batch import Array
+from restir_ref.chance import Chance
+from restir_ref.integrals import Pixels, Shifted
+from restir_ref.resampling import Candidate, select
+from restir_ref.transport.paths import Path, Tracer, leaves, trace
+from restir_ref.transport.record import record
+from restir_ref.transport.shifts import shift_path
+
+
+@dataclass(frozen=True, eq=False)
+class PathIntegrals:
+    """The pixels' path integrals in primary sample space; p_hat is the mean of F over channels."""
+
+    tracer: Tracer
+
+    @property
+    def n(self) -> int:
+        """Number of pixels."""
+        return self.tracer.sensor.n
+
+    def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Path, Array]]:
+        """One path tree, resampled to one of its leaves, which cover disjoint parts of the sample space."""
+        tree = trace(self.tracer, chance.uniform((self.tracer.D, len(index))), index % self.n)
+        found = list(leaves(tree))
+        one = np.ones(len(index))
+        offered = [Candidate(np.full(len(index), i), F.mean(axis=0), one) for i, (_, _, F) in enumerate(found)]
+        chosen = select(offered, chance, one)
+        k, nee = np.array([k for k, _, _ in found]), np.array([nee for _, nee, _ in found])
+        F = np.take_along_axis(np.stack([F for _, _, F in found]), chosen.x[None, None], axis=0)[0]
+        yield record(self.tracer, tree, k[chosen.x], nee[chosen.x], F), chosen.W
+
+    def target(self, index: Array, x: Path) -> Array:
+        """p_hat = mean of F over channels, visibility and MIS weight included."""
+        return np.asarray(x.F.mean(axis=0))
+
+    def contribution(self, index: Array, x: Path) -> Array:
+        """F = omega f / p, (C, N)."""
+        return x.F
+
+    def shift(self, x: Path, index: Array, to: Pixels) -> Shifted:
+        """Replay and reconnect in the other image's scene, seen by its sensor."""
+        there: PathIntegrals = to.of  # type: ignore[assignment]
+        y, J = shift_path(there.tracer, x, to.index % there.n)
+        return Shifted(y, J)
