@@ -1,0 +1,82 @@
+"""Whole frames of ReSTIR from the passes, with the paper's parameters as plain data.  [GRIS 6.3, 6.5, 8.3]"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from restir_ref.batch import Array
+from restir_ref.chance import Chance
+from restir_ref.integrals import Image, Pixels, Reservoirs
+from restir_ref.mis import WEIGHTS
+from restir_ref.restir import initial, spatial, temporal
+
+GOLDEN = (np.sqrt(5) - 1) / 2
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Parameters of a loop; `along` and `across` name the MIS weights of temporal and spatial reuse."""
+
+    trees: int
+    rounds: int
+    neighbours: int
+    radius: float
+    cap: float
+    along: str = "talbot"
+    across: str = "defensive"
+
+
+REAL_TIME = Preset(trees=1, rounds=1, neighbours=3, radius=20, cap=20)
+"""One path tree, temporal reuse with M_c = 20, one round with 3 random neighbours within 20 pixels."""
+
+OFFLINE = Preset(trees=32, rounds=3, neighbours=6, radius=10, cap=1)
+"""32 path trees resampled to one, 3 rounds with 6 neighbours within 10 pixels; step it without history."""
+
+Around = Callable[[Image, Array, int, float, Chance], Sequence[Pixels]]
+"""Chooses neighbours: (image, columns, how many, radius in pixels, chance) -> one Pixels each."""
+
+
+def frame(
+    here: Pixels,
+    chance: Chance,
+    preset: Preset,
+    around: Around,
+    history: Reservoirs | None = None,
+    before: Sequence[Pixels] = (),
+) -> Reservoirs:
+    """One frame: initial samples, temporal reuse if there is history, rounds of spatial reuse.
+
+    history are the previous frame's reservoirs, `before` the columns of it that motion vectors
+    name, in the previous frame's integrals.
+    """
+    X = initial(here, chance, preset.trees)
+    if history is not None:
+        X = temporal(X, here, history, before, chance, mis=WEIGHTS[preset.along], cap=preset.cap)
+    for _ in range(preset.rounds):
+        image: Image = here.of  # type: ignore[assignment]
+        near = around(image, here.index, preset.neighbours, preset.radius, chance)
+        X = spatial(X, here, near, chance, mis=WEIGHTS[preset.across])
+    return X
+
+
+def random_in_row(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
+    """Neighbours uniform in -radius .. radius of a row of n pixels, mirrored at its ends; never a pixel's own place
+    but by mirroring."""
+    return [_moved(of, index, u, radius) for u in chance.uniform((count, len(index)))]
+
+
+def spread_in_row(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
+    """The same from the golden-ratio sequence with a random start per column: evenly spread."""
+    start = chance.uniform((len(index),))
+    return [_moved(of, index, (start + k * GOLDEN) % 1, radius) for k in range(count)]
+
+
+def _moved(of: Image, index: Array, u: Array, radius: float) -> Pixels:
+    """u in [0, 1) chooses one of the steps -radius .. -1, 1 .. radius."""
+    reach = int(radius)
+    step = np.floor(u * 2 * reach).astype(int) - reach
+    pixel = index % of.n
+    place = np.abs(pixel + step + (step >= 0))
+    mirrored = of.n - 1 - np.abs(of.n - 1 - place)
+    return Pixels(of, index - pixel + np.clip(mirrored, 0, of.n - 1))
