@@ -1,0 +1,156 @@
+"""Shifts first of all: round trips, re-tracing from scratch, and finite differences, on every scene.
+
+Image means are nearly blind to wrong Jacobians, for reuse is nearly symmetric; these laws are not.
+"""
+
+import numpy as np
+import pytest
+
+from flatland2d import SCENES
+from restir_ref.batch import take
+from restir_ref.transport import shifts as shifts_module
+from restir_ref.transport.inversion import connection
+from restir_ref.transport.materials import evaluate_lobe
+from restir_ref.transport.shifts import replay, shift_path
+from restir_ref.transport.vectors import norm
+from tests.transport.paths import HYBRID, RULES, finite_difference_jacobian, retraced, shifts, successful
+
+N = 1500
+every_scene = pytest.mark.parametrize("scene", SCENES)
+every_rule = pytest.mark.parametrize("rule", RULES)
+
+EDGE_CASES = 1e-3
+"""Share of paths that floating point may decide differently there and back: grazing occlusion and corners."""
+
+
+@pytest.mark.claims("GRIS-A09", "GRIS-A10", "GRIS-A11", "GRIS-E35")
+@every_rule
+@every_scene
+def test_a_shift_there_and_back_returns_the_path_with_inverse_jacobians(scene, rule) -> None:
+    s = successful(shifts(SCENES[scene](), RULES[rule], N, seed=1))
+    back, J = shift_path(s.t, s.y, s.i)
+    returned = J > 0
+    assert (~returned).mean() <= EDGE_CASES
+    assert np.abs(s.J * J - 1)[returned].max(initial=0) < 1e-9
+    assert np.abs(back.F / s.x.F - 1)[:, returned].max(initial=0) < 1e-6
+
+
+@pytest.mark.claims("GRIS-A11", "GRIS-A17")
+@pytest.mark.parametrize("rule", ["hybrid", "reconnection"])
+@every_scene
+def test_tracing_the_offset_path_from_scratch_finds_the_same_path(scene, rule) -> None:
+    s = successful(shifts(SCENES[scene](), RULES[rule], N, seed=2))
+    _, y = retraced(s)
+    same = np.abs(y.F / s.y.F - 1).max(axis=0) < 1e-7
+    assert (~same).mean() <= EDGE_CASES
+    assert (y.c == s.y.c)[same].all()
+    assert np.abs(y.A / s.y.A - 1)[same].max(initial=0) < 1e-7
+
+
+@pytest.mark.claims("GRIS-E53", "GRIS-E54")
+@pytest.mark.parametrize("rule", ["hybrid", "reconnection"])
+@every_scene
+def test_the_jacobian_is_that_of_finite_differences(scene, rule) -> None:
+    s = successful(shifts(SCENES[scene](), RULES[rule], 400, seed=3))
+    error = jacobian_errors(s, s.J)
+    assert np.median(error) < 1e-8
+    assert np.quantile(error, 0.97) < 1e-5
+
+
+def jacobian_errors(s, J) -> np.ndarray:
+    """|finite difference / J - 1| of the first 150 paths, where no discrete choice changed."""
+    few = np.arange(min(150, len(s.J)))
+    part = type(s)(s.t, take(s.x, few), s.i[few], take(s.y, few), s.j[few], s.J[few])
+    measured, same = finite_difference_jacobian(part)
+    assert same.mean() > 0.3
+    return np.abs(measured / J[few] - 1)[same]
+
+
+@pytest.mark.claims("GRIS-A12")
+@every_scene
+def test_hybrid_connects_nothing_nearer_than_its_distance(scene) -> None:
+    s = successful(shifts(SCENES[scene](), HYBRID, N, seed=4))
+    connected = s.x.c > 0
+    for path, pixel in ((s.x, s.i), (s.y, s.j)):
+        part = take(path, np.flatnonzero(connected))
+        v = replay(s.t, part, pixel[connected], part.c - 1).v
+        assert np.linalg.norm(part.z - v.x, axis=0).min(initial=1) >= HYBRID.distance
+
+
+@pytest.mark.claims("GRIS-A10")
+@every_scene
+def test_replay_back_is_bitwise_the_same_path(scene) -> None:
+    s = successful(shifts(SCENES[scene](), RULES["replay"], N, seed=5))
+    back, J = shift_path(s.t, s.y, s.i)
+    assert (s.J == 1).all()
+    assert (back.F == s.x.F).all()
+    assert (J == 1).all()
+
+
+# The twins: planted bugs, and which law sees them.
+
+
+def reconnected(s):
+    """The columns that reconnect at a vertex from which a BSDF sample goes on."""
+    columns = np.flatnonzero((s.x.c > 0) & (s.x.c < s.x.k))
+    return type(s)(s.t, take(s.x, columns), s.i[columns], take(s.y, columns), s.j[columns], s.J[columns])
+
+
+def ends(s):
+    """Distance, lobe probability and density of the outgoing direction at both paths' connections."""
+    found = []
+    for path, pixel in ((s.x, s.i), (s.y, s.j)):
+        c = connection(s.t, path, pixel)
+        columns = np.arange(len(pixel))
+        local = s.t.scene.space.to_local(c.z.n, path.out)
+        _, p_out = evaluate_lobe(s.t.scene.materials, s.t.scene.space, c.z, path.lobe_out, local)
+        r, P = norm(path.z - c.v.x), c.P_in[path.lobe_in, columns]
+        through = (path.c <= path.k) & ~(path.nee & (path.c == path.k))
+        found.append((r, P, np.where(through, c.P_out[path.lobe_out, columns] * p_out, 1.0)))
+    return found
+
+
+PLANTED = {
+    "r^2 in flatland": lambda x, y: x[0] / y[0],
+    "J inverted in r": lambda x, y: (y[0] / x[0]) ** 2,
+    "second density ratio dropped": lambda x, y: x[2] / y[2],
+}
+
+
+@pytest.mark.claims("GRIS-E52", "GRIS-E54")
+@pytest.mark.parametrize("bug", PLANTED)
+def test_finite_differences_see_a_planted_jacobian_bug_and_round_trips_do_not(bug) -> None:
+    s = reconnected(successful(shifts(SCENES["glossy_cornell"](), RULES["reconnection"], 1500, seed=6)))
+    x, y = ends(s)
+    factor = PLANTED[bug](x, y)
+    error = jacobian_errors(s, s.J * factor)
+    assert np.quantile(error, 0.75) > 1e-4
+    _, J_back = shift_path(s.t, s.y, s.i)
+    product = (s.J * factor) * (J_back / factor)  # the bug is its own inverse on the way back
+    assert np.abs(product - 1)[J_back > 0].max() < 1e-9
+
+
+def never(rule, r_x, r_z, distance):
+    """A mistake: the replayed prefix is not tested for an earlier connection."""
+    return np.zeros(len(distance), dtype=bool)
+
+
+@pytest.mark.claims("GRIS-A11")
+def test_retracing_sees_a_missing_test_for_earlier_connections(monkeypatch) -> None:
+    right = shifts_module._step
+    monkeypatch.setattr(shifts_module, "_step", with_predicate(right, never))
+    s = successful(shifts(SCENES["glossy_cornell"](), HYBRID, 12_000, seed=7))
+    monkeypatch.undo()
+    _, y = retraced(s)
+    assert (y.c != s.y.c).mean() > EDGE_CASES
+
+
+def with_predicate(step, predicate):
+    def changed(*args):
+        original, shifts_module.connectable = shifts_module.connectable, predicate
+        try:
+            return step(*args)
+        finally:
+            shifts_module.connectable = original
+
+    return changed
