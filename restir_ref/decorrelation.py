@@ -1,15 +1,20 @@
-"""Metropolis-Hastings mutations between temporal and spatial reuse decorrelate neighbours.  [MCMC 3.2]
+"""Metropolis-Hastings mutations between temporal and spatial reuse decorrelate neighbours.  [MCMC 3.2, 4.2]
 
 Integrals that can be mutated have one more method,
 `propose(index, x, chance) -> (x', T(x' -> x) / T(x -> x'))`.
 """
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
+from scipy.special import ndtri
 
-from restir_ref.batch import Array, ratio, where
+from restir_ref.batch import Array, ratio, total, where
 from restir_ref.chance import Chance
+from restir_ref.guards import nonnegative
 from restir_ref.integrals import Integrals, Pixels, Reservoirs, Sample, target
 
 
@@ -17,18 +22,123 @@ class Mutable(Integrals, Protocol):
     """Integrals whose samples can be mutated."""
 
     def propose(self, index: Array, x: Sample, chance: Chance) -> tuple[Sample, Array]:
-        """A proposal x' and the ratio T(x' -> x) / T(x -> x') of its transition densities (N,)."""
+        """A proposal x' and the ratio T(x' -> x) / T(x -> x') of its transition densities (N,).
+
+        The ratio 0 says that x' is invalid: it is rejected, and the step counts all the same.
+        """
 
 
-def mutate(X: Reservoirs, here: Pixels, chance: Chance) -> Reservoirs:
-    """One Metropolis-Hastings step that leaves p_hat invariant.  [MCMC 3.2.1, 3.2.4]
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A proposal x -> x_new for reservoirs X, with p_hat(x), p_hat(x') and T(x' -> x) / T(x -> x'), each (N,)."""
 
-    a = min(1, p_hat(x') T(x' -> x) / (p_hat(x) T(x -> x')));  if accepted W <- W p_hat(x) / p_hat(x').
+    here: Pixels
+    X: Reservoirs
+    x_new: Sample
+    p_hat: Array
+    p_hat_new: Array
+    T_ratio: Array
+
+
+Acceptance = Callable[[Move], Array]
+"""The probability a (N,) that a move is made."""
+
+
+def metropolis(move: Move) -> Array:
+    """a = min(1, p_hat(x') T(x' -> x) / (p_hat(x) T(x -> x'))).  [MCMC 3.2.1]"""
+    # erratum: the printed formula lacks the minimum, without which detailed balance holds only at ratio 1.
+    return ratio(np.minimum(move.p_hat_new * move.T_ratio, move.p_hat), move.p_hat)
+
+
+def mutate(X: Reservoirs, here: Pixels, chance: Chance, acceptance: Acceptance = metropolis) -> Reservoirs:
+    """One Metropolis-Hastings step that leaves p_hat invariant; k steps are k calls.  [MCMC 3.2]"""
+    return attempt(X, here, chance, acceptance)[0]
+
+
+def attempt(X: Reservoirs, here: Pixels, chance: Chance, acceptance: Acceptance) -> tuple[Reservoirs, Array]:
+    """Propose x'; where accepted, X <- x' and W <- W p_hat(x) / p_hat(x'): p_hat W stays.  [MCMC 3.2.4]
+
+    Returns the reservoirs and where the proposal was accepted (N,).
     """
+    # erratum: the prose of 5.2.4 turns the ratio of W upside down, unlike 3.2.4 and Alg. 6; and Alg. 3
+    # forgets all accepted moves if the last proposal is rejected.
     of: Mutable = here.of  # type: ignore[assignment]
-    proposal, T_ratio = of.propose(here.index, X.x, chance)
-    p_hat, p_hat_new = target(here, X.x), target(here, proposal)
-    a = np.minimum(1, ratio(p_hat_new * T_ratio, p_hat))
+    x_new, T_ratio = of.propose(here.index, X.x, chance)
+    nonnegative(T_ratio, "the ratio T(x' -> x) / T(x -> x')", "Return 0 for an invalid proposal from propose().")
+    move = Move(here, X, x_new, target(here, X.x), target(here, x_new), T_ratio)
+    a = np.where(move.p_hat_new > 0, acceptance(move), 0)
     accepted = chance.choose(np.stack([1 - a, a])) == 1
-    W = np.where(accepted, X.W * ratio(p_hat, p_hat_new), X.W)
-    return Reservoirs(where(accepted, proposal, X.x), W, X.c)
+    W_new = X.W * ratio(move.p_hat, np.where(accepted, move.p_hat_new, 1))
+    return Reservoirs(where(accepted, x_new, X.x), np.where(accepted, W_new, X.W), X.c), accepted
+
+
+# ---------------------------------------------------------------- steps of primary sample numbers
+
+Step = Callable[[Array, float, Chance], tuple[Array, Array]]
+"""step(u (..., N), sigma, chance) -> (u', T(u' -> u) / T(u -> u') (N,)), u in [0, 1)."""
+
+
+def gaussian(u: Array, sigma: float, chance: Chance) -> Array:
+    """u + sigma n, n standard normal."""
+    return np.asarray(u + sigma * ndtri(np.maximum(chance.uniform(u.shape), 2.0**-60)))
+
+
+def wrapped(u: Array, sigma: float, chance: Chance) -> tuple[Array, Array]:
+    """u' = u + sigma n modulo 1, symmetric on the circle.  [MCMC 5.2.2]"""
+    u_new = gaussian(u, sigma, chance) % 1
+    return np.where(u_new < 1, u_new, 0), np.ones(u.shape[-1])  # -1e-20 % 1 is 1
+
+
+def bounded(u: Array, sigma: float, chance: Chance) -> tuple[Array, Array]:
+    """u' = u + sigma n, invalid outside of [0, 1); clamping it there would not be symmetric.  [MCMC 5.2.2]"""
+    u_new = gaussian(u, sigma, chance)
+    inside = (u_new >= 0) & (u_new < 1)
+    return np.where(inside, u_new, u), np.where(inside.reshape(-1, u.shape[-1]).all(axis=0), 1.0, 0.0)
+
+
+STEPS: Mapping[str, Step] = MappingProxyType({"wrapped": wrapped, "bounded": bounded})
+
+# ---------------------------------------------------------------- blue noise
+
+
+def energy(distance: Array | float, difference: Array) -> Array:
+    """E(i, j) = exp(-|i_c - j_c|^2 / 2.1^2 - sqrt(|i_s - j_s|)): pixels i_c, luminances i_s.  [MCMC 4.2]"""
+    return np.asarray(np.exp(-((distance / 2.1) ** 2) - np.sqrt(abs(difference))))
+
+
+def annealed(e: Array, e_new: Array, temperature: float) -> Array:
+    """a_bn = 1 if e' < e, otherwise exp(-(e' - e) / T).  [MCMC 4.2]"""
+    return np.asarray(np.exp(-np.maximum(e_new - e, 0) / temperature))
+
+
+@dataclass(frozen=True, eq=False)
+class Blue:
+    """The acceptance a = min(1, (w_bn a_bn + (1 - w_bn) p_hat(x') / p_hat(x)) T(x' -> x) / T(x -> x')).  [MCMC 4.2]
+
+    luminance (N,) is that of the columns before the mutations; `neighbours` are arrays (N,) of columns,
+    `distances` their distances in pixels.  Hazard: w_bn > 0 does not leave p_hat invariant, so W is
+    biased; and in grey pixels, whose luminance p_hat W cannot change, a_bn is always 1.
+    """
+
+    luminance: Array
+    neighbours: Sequence[Array]
+    distances: Sequence[float]
+    w: float
+    temperature: float = 0.01
+
+    def __call__(self, move: Move) -> Array:
+        """a (N,)."""
+        a_bn = annealed(*self.energies(move), self.temperature)
+        mixed = self.w * a_bn + (1 - self.w) * ratio(move.p_hat_new, move.p_hat)
+        return np.minimum(1, mixed * move.T_ratio)
+
+    def energies(self, move: Move) -> tuple[Array, Array]:
+        """e and e': mean energies with the neighbours of the old luminance and of the mutated one.  [MCMC Alg. 6]"""
+        W_new = move.X.W * ratio(move.p_hat, move.p_hat_new)
+        mutated = (move.here.of.contribution(move.here.index, move.x_new) * W_new).mean(axis=0)
+        return self._mean_energy(self.luminance), self._mean_energy(mutated)
+
+    def _mean_energy(self, luminance: Array) -> Array:
+        pairs = zip(self.neighbours, self.distances, strict=True)
+        terms = [energy(distance, luminance - self.luminance[near]) for near, distance in pairs]
+        return total(terms) / len(terms)

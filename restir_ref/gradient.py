@@ -1,76 +1,145 @@
 """Gradient-domain ReSTIR: a pair of pixels is one integral, and each sign of it is another.  [GPT 3-4]
 
 The paired domain of pixels (i, j) is (Omega_i x {0}) + (Omega_j x {1}): a base path in one pixel
-whose offset path in the other is rebuilt by the inner shift whenever it is needed.  `Pairs` wraps
-any integrals; the passes of `restir` do the rest.
+beside its offset path in the other, which the inner shift makes.  `Pairs` wraps any integrals; the
+passes of `restir` do the rest.  Scalar integrands only: the sign of a coloured difference is ambiguous.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio
+from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Chance
-from restir_ref.integrals import Integrals, Pixels, Sample, Shifted, target
+from restir_ref.integrals import Integrals, Pixels, Proxy, Reservoirs, Sample, Shifted, target
+
+
+def omega(x: Sample, base: Pixels, y: Shifted, offset: Pixels, proxy: Proxy = target) -> Array:
+    """w_ij(x) = q_i(x) / (q_i(x) + q_j(T_ij x) J); q = p_hat [GPT Eq. 13], or `pdf` [GPT Eq. 4].
+
+    w = 1 where the shift is undefined.  With q = p, base paths of f = 0 must be kept, for w > 0 and
+    their offset paths may have f > 0; with q = p_hat they have w = 0 and may be thrown away.
+    """
+    q = proxy(base, x)
+    return ratio(q, q + proxy(offset, y.x) * y.J)
+
+
+def gap(x: Sample, base: Pixels, y: Shifted, offset: Pixels) -> Array:
+    """f_i(x) - f_j(T_ij x) J, y = T_ij x; (N,).  [GPT Eq. 2, 15]"""
+    f_base, f_offset = (at.of.contribution(at.index, z)[0] for at, z in ((base, x), (offset, y.x)))
+    return np.asarray(f_base - f_offset * y.J)
+
+
+def one_sided(X: Reservoirs, base: Pixels, offset: Pixels, proxy: Proxy = target) -> Array:
+    """<Delta'_ij> = w_ij(y) (f_i(y) - f_j(T_ij y) J) W_y; (N,).  [GPT Eq. 11]"""
+    y = base.of.shift(X.x, base.index, offset)
+    return omega(X.x, base, y, offset, proxy) * gap(X.x, base, y, offset) * X.W
+
+
+def gradient_after(X: Reservoirs, i: Pixels, j: Pixels, proxy: Proxy = target) -> Array:
+    """<Delta_ij> = <Delta'_ij> - <Delta'_ji> from the pixels' own samples, all in X; (N,).  [GPT Eq. 12]"""
+    return one_sided(take(X, i.index), i, j, proxy) - one_sided(take(X, j.index), j, i, proxy)
+
+
+Part = Callable[[Array], Array]
+"""The part >= 0 of a signed integrand that one reservoir samples."""
+
+
+def positive(d: Array) -> Array:
+    """max(d, 0).  [GPT Eq. 25]"""
+    return np.asarray(np.maximum(d, 0))
+
+
+def negative(d: Array) -> Array:
+    """max(-d, 0).  [GPT Eq. 26]"""
+    return np.asarray(np.maximum(-d, 0))
+
+
+def magnitude(d: Array) -> Array:
+    """|d|: one reservoir for both signs, whose estimate +-sum w jumps between them.  [GPT Eq. 19]"""
+    return np.asarray(abs(d))
+
+
+SIGNS: Mapping[str, Part] = MappingProxyType({"positive": positive, "negative": negative})
+"""Positivization: d = positive(d) - negative(d).  [GPT Eq. 23]"""
 
 
 @dataclass(frozen=True)
-class Based:
-    """A base path x and the side k (N,) of the pair it lives on: 0 for pixel i, 1 for pixel j."""
+class Paired:
+    """A base path x, the side k (N,) of the pair it lives on (0 for i, 1 for j), and its offset path with J."""
 
     x: Sample
     k: Array
+    offset: Shifted
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """The differences int f_i - int f_j of pairs (i, j), restricted to one sign of the integrand.
+    """One part of the differences int f_i - int f_j of pairs (i, j).
 
-    ends (2, E) holds the pixels i and j of every pair; column = replica * E + pair.  sign = +1 or
-    -1; contributions are signed, so an estimate adds up the two signs' shading.  Scalar integrands
-    only: with colours the sign of a difference is ambiguous.
+    ends (2, E) holds the pixels i and j of every pair; column = replica * E + pair.  Contributions
+    are signed: an estimate adds up the shading of both signs, or is that of `magnitude` alone.
     """
 
     of: Integrals
     ends: Array
-    sign: int
+    part: Part
+    proxy: Proxy = target
 
-    def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Based, Array]]:
+    @property
+    def n(self) -> int:
+        """Number of pairs."""
+        return int(self.ends.shape[-1])
+
+    def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Paired, Array]]:
         """Both pixels' candidates: they cover disjoint halves of the paired domain."""
-        for k in (0, 1):
-            side = np.full(len(index), k)
-            for x, mW in self.of.candidates(self.end(index, side), chance):
-                yield Based(x, side), mW
+        for side in (0, 1):
+            yield from self.based(index, np.full(len(index), side), chance)
 
-    def target(self, index: Array, x: Based) -> Array:
-        """p_hat = max(+-w* G, 0).  [GPT Eq. 26]"""
-        return np.asarray(np.maximum(self.sign * self.difference(index, x), 0))
+    def based(self, index: Array, k: Array, chance: Chance) -> Iterator[tuple[Paired, Array]]:
+        """Candidates whose base paths live on side k."""
+        for x, mW in self.of.candidates(self.end(index, k).index, chance):
+            yield self.paired(index, x, k), mW
 
-    def contribution(self, index: Array, x: Based) -> Array:
-        """w* G where it has this sign, shape (1, N).  [GPT Eq. 24]"""
-        return np.asarray(self.sign * self.target(index, x)[None])
+    def paired(self, index: Array, x: Sample, k: Array) -> Paired:
+        """The base path x on side k with its offset path T_ij(x) on the other: the inner shift.  [GPT 4.2.1]"""
+        return Paired(x, k, self.of.shift(x, self.end(index, k).index, self.end(index, 1 - k)))
 
-    def shift(self, x: Based, index: Array, to: Pixels) -> Shifted:
-        """Outer shift: the base path moves from i to i' or j to j'; J* = J_tau.  [GPT Eq. 21-22]"""
+    def target(self, index: Array, x: Paired) -> Array:
+        """p_hat = max(+-w* G, 0), or w* |G|; (N,).  [GPT Eq. 19, 25-26]"""
+        # hazard: Eq. 19 is printed with T* inside p_hat; x has been shifted already, and once more is biased.
+        return self.part(self.difference(index, x))
+
+    def contribution(self, index: Array, x: Paired) -> Array:
+        """w* G where p_hat > 0, shape (1, N).  [GPT Eq. 17, 24]"""
+        d = self.difference(index, x)
+        return np.where(self.part(d) > 0, d, 0)[None]
+
+    def shift(self, x: Paired, index: Array, to: Pixels) -> Shifted:
+        """T*: the base path moves from i to i' or j to j', its offset path is rebuilt; J* = J_tau.  [GPT Eq. 21-22]"""
         there: Pairs = to.of  # type: ignore[assignment]
-        outer = self.of.shift(x.x, self.end(index, x.k), Pixels(there.of, there.end(to.index, x.k)))
-        return Shifted(Based(outer.x, x.k), outer.J)
+        tau = self.of.shift(x.x, self.end(index, x.k).index, there.end(to.index, x.k))
+        return Shifted(there.paired(to.index, tau.x, x.k), tau.J)
 
-    def end(self, index: Array, k: Array) -> Array:
-        """The pixel on side k (N,) of each column's pair."""
-        return np.asarray(self.ends[k, index % self.ends.shape[-1]])
+    def end(self, index: Array, k: Array) -> Pixels:
+        """The pixels on side k (N,) of each column's pair."""
+        return Pixels(self.of, self.ends[k, index % self.n])
 
-    def difference(self, index: Array, x: Based) -> Array:
-        """w* G = w (f_base(x) - f_offset(T x) J), negated for bases in pixel j; (N,).  [GPT Eq. 13, 15, 16]"""
-        base = Pixels(self.of, self.end(index, x.k))
-        offset = Pixels(self.of, self.end(index, 1 - x.k))
-        y = self.of.shift(x.x, base.index, offset)
-        p_base, p_offset = target(base, x.x), target(offset, y.x) * y.J
-        f_base, f_offset = self._f(base, x.x), self._f(offset, y.x) * y.J
-        difference = ratio(p_base * (f_base - f_offset), p_base + p_offset)
-        return np.where(x.k == 0, difference, -difference)
+    def difference(self, index: Array, x: Paired) -> Array:
+        """w* G = w (f_base(x) - f_offset(T x) J), negated for bases in pixel j; (N,).  [GPT Eq. 15-16]"""
+        base, offset = self.end(index, x.k), self.end(index, 1 - x.k)
+        d = omega(x.x, base, x.offset, offset, self.proxy) * gap(x.x, base, x.offset, offset)
+        return np.where(x.k == 0, d, -d)
 
-    def _f(self, at: Pixels, x: Sample) -> Array:
-        """The scalar integrand of one pixel."""
-        return np.asarray(self.of.contribution(at.index, x)[0])
+
+@dataclass(frozen=True, eq=False)
+class TossedPairs(Pairs):
+    """Pairs whose candidates live on one side at a time."""
+
+    def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Paired, Array]]:
+        """The candidates of i or j by the toss of a coin, whose probability 1/2 enters W.  [GPT 4.2]"""
+        k = chance.choose(np.ones((2, len(index))))
+        for x, mW in self.based(index, k, chance):
+            yield x, 2 * mW
