@@ -5,6 +5,8 @@ Roughness is perceptual (alpha = roughness^2); lengths are in units of the unit 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain as joined
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -51,7 +53,7 @@ def mixed(albedo: float, roughness: float, gloss: float) -> Material:
 def chain(points: Sequence[Point], material: int, emission: float = 0.0) -> list[Facet]:
     """Segments along a polyline, front on its left."""
     light = (emission,) if emission else ()
-    return [Facet((a, b), material, light) for a, b in zip(points, points[1:], strict=False)]
+    return [Facet((a, b), material, light) for a, b in pairwise(points)]
 
 
 def block(low: Point, high: Point, material: int) -> list[Facet]:
@@ -114,7 +116,11 @@ def occluders() -> Setting:
     """FS5: posts at different depths before a lit wall: depth edges, shadow edges, occluded shifts."""
     posts = [block((x, y), (x + 0.03, y + 0.12), 1) for x, y in ((0.35, 0.2), (0.5, 0.45), (0.62, 0.7), (0.75, 0.3))]
     light = chain([(0.6, 0.995), (0.4, 0.995)], 0, 10.0)
-    return Setting(scene(PLANE, [matte(0.6), matte(0.4)], [*room(0), *sum(posts, []), *light]), (0.03, 0.5), (1.0, 0.5))
+    return Setting(
+        scene(PLANE, [matte(0.6), matte(0.4)], [*room(0), *joined.from_iterable(posts), *light]),
+        (0.03, 0.5),
+        (1.0, 0.5),
+    )
 
 
 def checker() -> Setting:
@@ -130,7 +136,11 @@ def rack() -> Setting:
     """FS7: bars lit from both sides: gradients of both signs at one pair."""
     bars = [block((0.15 + 0.1 * i, 0.3), (0.18 + 0.1 * i, 0.6), 1) for i in range(7)]
     lights = [*chain([(0.005, 0.8), (0.005, 0.5)], 0, 8.0), *chain([(0.995, 0.5), (0.995, 0.8)], 0, 8.0)]
-    return Setting(scene(PLANE, [matte(0.5), matte(0.7)], [*room(0), *sum(bars, []), *lights]), (0.5, 0.95), (0.5, 0.0))
+    return Setting(
+        scene(PLANE, [matte(0.5), matte(0.7)], [*room(0), *joined.from_iterable(bars), *lights]),
+        (0.5, 0.95),
+        (0.5, 0.0),
+    )
 
 
 def glass_disc() -> Setting:
@@ -172,7 +182,7 @@ def many_lights() -> Setting:
     power = 2 + 18 * np.abs(np.sin(np.arange(64) * 2.4))
     lamps = [chain([((i + 0.6) / 64, 0.99), ((i + 0.4) / 64, 0.99)], 0, float(p)) for i, p in enumerate(power)]
     slats = [chain([(x, 0.8), (x + 0.05, 0.8)], 1) for x in np.linspace(0.05, 0.9, 9)]
-    facets = [*room(0), *sum(lamps, []), *sum(slats, []), *block((0.4, 0.001), (0.6, 0.2), 1)]
+    facets = [*room(0), *joined.from_iterable(lamps), *joined.from_iterable(slats), *block((0.4, 0.001), (0.6, 0.2), 1)]
     return Setting(scene(PLANE, [matte(0.5), matte(0.3)], facets), (0.5, 0.6), (0.3, 0.0))
 
 
