@@ -62,7 +62,7 @@ def crossed_strings(a: Array, b: Array, c: Array, d: Array) -> Array:
     """F_ab->cd |ab| = (|ad| + |bc| - |ac| - |bd|) / 2 where the panels see each other wholly; (..., P)."""
 
     def length(p: Array, q: Array) -> Array:
-        return np.sqrt(((p - q) ** 2).sum(axis=0))
+        return np.asarray(np.sqrt(((p - q) ** 2).sum(axis=0)))
 
     return np.asarray(np.abs(length(a, c) + length(b, d) - length(a, d) - length(b, c)) / 2)
 
@@ -88,14 +88,14 @@ def seen_share(scene: Scene, p: Panels, i: Array, j: Array) -> Array:
 
 def in_front(x: Array, n: Array, y: Array) -> Array:
     """Whether y_j is on the side of n_i as seen from x_i, (P, Q)."""
-    return np.einsum("di,dij->ij", n, y[:, None] - x[:, :, None]) > 0
+    return np.asarray(np.einsum("di,dij->ij", n, y[:, None] - x[:, :, None]) > 0)
 
 
 def radiance(scene: Scene, p: Panels, bounces: int) -> Array:
     """B after so many scattering events: B <- E + albedo F B, starting from E; (P,)."""
     F, B = form_factors(scene, p), p.emission
     for _ in range(bounces):
-        B = p.emission + p.albedo * (F @ B)
+        B = np.asarray(p.emission + p.albedo * (F @ B))
     return B
 
 

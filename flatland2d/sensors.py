@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from restir_ref.batch import Array
+from restir_ref.transport.paths import Sensor
+from restir_ref.transport.rays import arrive
+from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import normalize
 
 FILM = 1920
@@ -16,6 +19,7 @@ class Pinhole:
     """A row of n pixels, a crop of a film of `film` pixels that starts at pixel `first`.
 
     eye and towards are points; `half` is the tangent of half the field of view.
+    Raises ValueError for a crop that is empty or not on the film, no direction, or no field of view.
     """
 
     eye: tuple[float, float]
@@ -25,7 +29,22 @@ class Pinhole:
     first: int = 0
     film: int = FILM
 
-    numbers: int = 1
+    def __post_init__(self) -> None:
+        if not (self.n > 0 and 0 <= self.first <= self.film - self.n):
+            raise ValueError(
+                f"a crop needs pixels on the film, 0 .. {self.film - 1}, but begins at {self.first} and has {self.n}."
+            )
+        if not 0 < self.half < np.inf:
+            raise ValueError(
+                f"half, the tangent of half the field of view, must be positive and finite, but is {self.half}."
+            )
+        if not 0 < np.linalg.norm(np.subtract(self.towards, self.eye)) < np.inf:
+            raise ValueError(f"the pinhole needs a direction to look in: eye {self.eye}, towards {self.towards}.")
+
+    @property
+    def numbers(self) -> int:
+        """One number: the place on the film."""
+        return 1
 
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A ray through the pixel; box filter, weight 1."""
@@ -33,24 +52,37 @@ class Pinhole:
         right = np.stack([forward[1], -forward[0]])
         s = (2 * (self.first + pixel + u[0]) / self.film - 1) * self.half
         w = normalize(forward + s * right)
-        return np.broadcast_to(np.array(self.eye)[:, None], w.shape), w, np.ones(len(pixel))
+        return np.broadcast_to(np.array(self.eye, dtype=float)[:, None], w.shape), w, np.ones(len(pixel))
 
 
 @dataclass(frozen=True)
 class FluenceMap:
-    """columns x rows pixels over the rectangle low .. high; each integrates radiance from all directions."""
+    """columns x rows pixels over the rectangle low .. high; each integrates radiance from all directions.
+
+    Raises ValueError for no pixels, or an empty rectangle.
+    """
 
     low: tuple[float, float]
     high: tuple[float, float]
     columns: int
     rows: int
 
-    numbers: int = 3
+    def __post_init__(self) -> None:
+        if not (self.columns > 0 and self.rows > 0):
+            raise ValueError(f"a fluence map needs pixels, but has {self.columns} columns and {self.rows} rows.")
+        size = np.subtract(self.high, self.low)
+        if not (np.isfinite(size).all() and (size > 0).all()):
+            raise ValueError(f"a fluence map needs low below high, but has {self.low} and {self.high}.")
 
     @property
     def n(self) -> int:
         """Number of pixels; pixel = row * columns + column, row 0 at the bottom."""
         return self.columns * self.rows
+
+    @property
+    def numbers(self) -> int:
+        """Three numbers: the place in the pixel, and the direction."""
+        return 3
 
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A uniform place of the pixel and a uniform direction; weight 2 pi."""
@@ -59,3 +91,17 @@ class FluenceMap:
         x = low + cell / np.array([[self.columns], [self.rows]]) * (high - low)
         angle = 2 * np.pi * u[2]
         return x, np.stack([np.cos(angle), np.sin(angle)]), np.full(len(pixel), 2 * np.pi)
+
+
+def facing(scene: Scene, sensor: Sensor) -> Array:
+    """What the middle of each pixel sees: 1 the front of a surface, -1 a back, 0 nothing; (n,)."""
+    pixel = np.arange(sensor.n)
+    x, w, _ = sensor.ray(pixel, np.full((sensor.numbers, sensor.n), 0.5))
+    v, _, met = arrive(scene, x, w)
+    return np.asarray(np.where(v.front, 1, -1) * met)
+
+
+def check_view(scene: Scene, sensor: Sensor) -> None:
+    """Raise ValueError if no pixel sees the front of a surface: the sensor is inside a solid, or out of doors."""
+    if not (facing(scene, sensor) > 0).any():
+        raise ValueError(f"{sensor} sees only backs of surfaces, or nothing: it stands in a solid or outside the room.")

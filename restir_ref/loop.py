@@ -61,8 +61,7 @@ def frame(
 
 
 def random_in_row(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
-    """Neighbours uniform in -radius .. radius of a row of n pixels, mirrored at its ends; never a pixel's own place
-    but by mirroring."""
+    """Neighbours uniform in -radius .. radius of a row of n pixels, mirrored at its ends."""
     return [_moved(of, index, u, radius) for u in chance.uniform((count, len(index)))]
 
 
