@@ -116,7 +116,10 @@ class Blue:
     """The acceptance a = min(1, (w_bn a_bn + (1 - w_bn) p_hat(x') / p_hat(x)) T(x' -> x) / T(x -> x')).  [MCMC 4.2]
 
     luminance (N,) is that of the columns before the mutations; `neighbours` are arrays (N,) of columns,
-    `distances` their distances in pixels.  Hazard: w_bn > 0 does not leave p_hat invariant, so W is
+    `distances` their distances in pixels.
+
+    # erratum: [MCMC 4.2] prints no min(1, .), and says that keeping T outside the weighted average
+    # guarantees detailed balance; it does not for any w_bn > 0.  Hazard: w_bn > 0 does not leave p_hat invariant, so W is
     biased; and in grey pixels, whose luminance p_hat W cannot change, a_bn is always 1.
     """
 

@@ -81,6 +81,8 @@ class Pairs:
 
     ends (2, E) holds the pixels i and j of every pair; column = replica * E + pair.  Contributions
     are signed: an estimate adds up the shading of both signs, or is that of `magnitude` alone.
+    The weight w* compares targets [GPT Eq. 13]; proxy=pdf compares sampling densities instead
+    [GPT Eq. 4, as Eq. 16 has it], for candidates fresh from the samplers.
     """
 
     of: Integrals

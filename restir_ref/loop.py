@@ -30,8 +30,8 @@ class Preset:
 REAL_TIME = Preset(trees=1, rounds=1, neighbours=3, radius=20, cap=20)
 """One path tree, temporal reuse with M_c = 20, one round with 3 random neighbours within 20 pixels."""
 
-OFFLINE = Preset(trees=32, rounds=3, neighbours=6, radius=10, cap=1)
-"""32 path trees resampled to one, 3 rounds with 6 neighbours within 10 pixels; step it without history."""
+OFFLINE = Preset(trees=32, rounds=3, neighbours=6, radius=10, cap=np.nan)
+"""32 path trees resampled to one, 3 rounds with 6 neighbours within 10 pixels; no temporal reuse, so no cap."""
 
 Around = Callable[[Image, Array, int, float, Chance], Sequence[Pixels]]
 """Chooses neighbours: (image, columns, how many, radius in pixels, chance) -> one Pixels each."""

@@ -1,8 +1,12 @@
 """Resampling MIS weights m_i(y) and contribution MIS weights c_i(y).  [GRIS 5.6, 6.2]
 
 Each weight is a pure function of its input's number i, of densities q(j) = p_hat_from_j(y) that
-are only shifted when asked for, and of the confidences.  Confidence enters by replication: c_j
-acts as c_j identical copies of input j.  Everywhere 0/0 = 0.
+are only shifted when asked for, and of the confidences.  Everywhere 0/0 = 0.
+
+# erratum: [GRIS 6.2] has confidences enter by multiplying p_hat and p_hat_from by c inside Eq. 37-38.
+# That is unbiased, but c_i is then not c_i identical copies (equal domains do not give c_i / C).
+# Here it is: |R| becomes C_R, M - |R| becomes C_N, and every term of a sum counts c_j times.
+# erratum: Eq. 37 is 0/0 where all inputs are canonical; its limit is c_i / C.
 
 `WEIGHTS` is the public family; tests, figures and the oracle iterate over it.
 """
@@ -63,7 +67,7 @@ def constant(i: int, q: Density, c: Confidences) -> Array:
 
 
 def one_over_z(i: int, q: Density, c: Confidences) -> Array:
-    """c_i = c_i 1{q_i > 0} / sum_j c_j 1{q_j > 0}: 1/Z of [Bitterli 2020] with confidences.  [GRIS Eq. 17]"""
+    """1{q_i > 0} c_i / Z, Z = sum_j c_j 1{q_j > 0}: the contribution weight of [Bitterli 2020].  [GRIS Eq. 17]"""
     realises = [np.where(q(j) > 0, c[j], 0) for j in range(len(c))]
     return ratio(realises[i], total(realises))
 

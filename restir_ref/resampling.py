@@ -64,7 +64,7 @@ def contribution_weight(y: Candidate) -> Array:
 
 
 def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservoirs:
-    """Choose Y by w_i = p_hat(Y_i) m_i W_i; W_Y = (c_s/m_s) sum_j w_j / p_hat(Y).  [GRIS Eq. 21-22]
+    """Choose Y by w_i = p_hat(Y_i) m_i W_i J_i; W_Y = (c_s/m_s) sum_j w_j / p_hat(Y).  [GRIS Eq. 21-22]
 
     Where all w_i are 0 the result is a null sample: the first candidate with W = 0, and the
     confidence c (N,) all the same.  Raises ValueError for no candidates or negative, NaN or
@@ -93,7 +93,11 @@ def select_any(ys: Sequence[Sample], cW: Sequence[Array], w: Sequence[Array], ch
 
 
 def gris(inputs: Sequence[Input], here: Pixels, mis: Weights, chance: Chance) -> Reservoirs:
-    """One pass of generalised RIS: weigh, then select; confidences add up.  [GRIS Eq. 19-22, 6.2]"""
+    """One pass of generalised RIS: weigh, then select; confidences add up.  [GRIS Eq. 19-22]
+
+    [GRIS 6.2] stores min(M_c, sum of confidences); here the sum is stored, and `restir.temporal`
+    caps the history when it comes in.  Both are unbiased.
+    """
     chosen = list(weigh(inputs, here, mis))
     return select(chosen, chance, np.minimum(total([each.X.c for each in inputs]), LARGEST_CONFIDENCE))
 

@@ -51,8 +51,8 @@ def temporal(
     """Resample new samples X with the history Y of the previous frame.  [GRIS 6.3 step 2, 6.4]
 
     Y holds the whole previous frame; each of `before` names one source column per pixel (motion
-    vectors), in the previous frame's integrals.  The confidence of history is capped on entry:
-    c <- min(c, cap).
+    vectors), in the previous frame's integrals.  The confidence of history is capped on entry,
+    c <- min(c, cap), where [GRIS 6.2] caps the result of a merge.
     """
     history = [Input(capped(take(Y, source.index), cap), source) for source in before]
     return gris([Input(X, here), *history], here, mis, chance)

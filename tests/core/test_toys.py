@@ -62,11 +62,13 @@ def support_faults(line) -> list[str]:
     return [fault for fault, wrong in answers.items() if wrong.any()]
 
 
+@pytest.mark.claims("GRIS-E35")
 @every_line
 def test_shifts_return_and_their_jacobians_are_reciprocal(line):
     assert shift_error(line) < 1e-12
 
 
+@pytest.mark.claims("GRIS-E35")
 @every_line
 def test_jacobians_are_the_derivatives_of_the_shifts(line):
     assert jacobian_error(line) < 1e-6
