@@ -119,7 +119,8 @@ class Blue:
     `distances` their distances in pixels.
 
     # erratum: [MCMC 4.2] prints no min(1, .), and says that keeping T outside the weighted average
-    # guarantees detailed balance; it does not for any w_bn > 0.  Hazard: w_bn > 0 does not leave p_hat invariant, so W is
+    # guarantees detailed balance; it does not for any w_bn > 0.
+    Hazard: w_bn > 0 does not leave p_hat invariant, so W is
     biased; and in grey pixels, whose luminance p_hat W cannot change, a_bn is always 1.
     """
 

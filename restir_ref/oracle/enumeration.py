@@ -7,13 +7,14 @@ every lane into one lane per combination of its pixels' non-zero options, and ru
 again.  Exact up to rounding; with `fractions.Fraction` arrays, exact.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from restir_ref.batch import Array, ratio
+from restir_ref.guards import nonnegative
 
 Result = TypeVar("Result")
 Program = Callable[[Array, "Enumerating"], Result]
@@ -23,6 +24,9 @@ LANES_AT_ONCE = 500_000
 
 MOST_LEAVES = 20_000_000
 """Enumerations beyond this many leaves are refused."""
+
+DIVES = 1000
+"""Lanes followed down to a leaf to estimate how many leaves there are."""
 
 
 class Unanswered(Exception):
@@ -44,8 +48,12 @@ class Enumerating:
         """The recorded answer of this call; raises `Unanswered` to have the lanes expanded."""
         self.calls += 1
         if self.calls > len(self.answers):
-            raise Unanswered(weights)
+            return self.unanswered(weights)
         return self.answers[self.calls - 1].reshape(-1)
+
+    def unanswered(self, weights: Array) -> Array:
+        """What to do about a call that has no answer yet."""
+        raise Unanswered(weights)
 
     def uniform(self, shape: tuple[int, ...]) -> Array:
         """Refused: a continuous number has no finite list of outcomes."""
@@ -78,28 +86,71 @@ class Outcome(Generic[Result]):
 def outcomes(program: Program[Result], n: int, most_leaves: int = MOST_LEAVES) -> Iterator[Outcome[Result]]:
     """Yield all outcomes of a program over n columns; their probabilities sum to 1.
 
-    Raises ValueError when more than `most_leaves` lanes are open or done, TypeError when the
-    program draws continuous numbers.
+    Raises ValueError when there are more than `most_leaves`, with an estimate of how many there are,
+    and where calls of `choose` do not fit the columns or each other; TypeError when the program
+    draws continuous numbers.
     """
     open_lanes, leaves = [Lanes([], np.ones(1, dtype=int))], 0
     while open_lanes:
         lanes = open_lanes.pop()
+        chance = Enumerating(lanes.answers)
         try:
-            result = program(np.arange(len(lanes) * n), Enumerating(lanes.answers))
+            result = program(np.arange(len(lanes) * n), chance)
         except Unanswered as question:
+            _check_weights(question.weights, len(lanes) * n)
+            new = _combinations(question.weights, n).sum()
+            least = leaves + sum(map(len, open_lanes)) + new
+            if least > most_leaves or new > 100 * DIVES:
+                _refuse(least, most_leaves, leaves + _estimate(program, [lanes, *open_lanes], n))
             open_lanes += _split(_expand(lanes, question.weights, n))
         else:
+            _check_calls(chance)
             leaves += len(lanes)
             yield Outcome(result, lanes.probability)
-        _refuse_beyond(most_leaves, leaves + sum(map(len, open_lanes)))
 
 
-def _refuse_beyond(most_leaves: int, leaves: int) -> None:
-    if leaves > most_leaves:
+def _refuse(least: float, limit: int, estimate: float) -> None:
+    """Stop in time: at once beyond the limit, earlier if the estimate is beyond twice the limit."""
+    if least > limit:
         raise ValueError(
-            f"this enumeration has at least {leaves} leaves, more than the limit of {most_leaves}: "
-            "take fewer pixels, cells or passes, or raise most_leaves."
+            f"this enumeration has at least {least:.7g} leaves, more than the limit of {limit}, and probably about "
+            f"{max(estimate, least):.2g} in all: take fewer pixels, cells or passes, or raise most_leaves."
         )
+    if estimate > 2 * limit:
+        raise ValueError(
+            f"this enumeration would have about {estimate:.2g} leaves, judging by its branching so far, more than the "
+            f"limit of {limit}: take fewer pixels, cells or passes, or raise most_leaves."
+        )
+
+
+def _check_calls(chance: Enumerating) -> None:
+    """The program has asked again what it was asked before."""
+    if chance.calls < len(chance.answers):
+        raise ValueError(
+            f"after {len(chance.answers)} calls of choose() were answered the program made only {chance.calls}: "
+            "the number of calls must not depend on samples, so call choose() outside of such branches and loops."
+        )
+
+
+def _check_weights(weights: Array, N: int) -> None:
+    """Raise ValueError for weights that are not (K, N), finite and >= 0."""
+    if weights.ndim != 2 or weights.shape[-1] != N:
+        raise ValueError(
+            f"choose() was given weights of shape {weights.shape}, but there are {N} columns: "
+            "weights are (options, columns), and every column takes part in every call."
+        )
+    nonnegative(weights, "a weight of choose()", "An option is chosen with probability weight / sum over options.")
+
+
+def _combinations(weights: Array, n: int) -> Array:
+    """Into how many lanes each lane splits: the product over its pixels of their options, (lanes,)."""
+    with np.errstate(over="ignore"):
+        return np.asarray(np.minimum(_options(weights).reshape(-1, n).prod(axis=1, dtype=float), 1e300))
+
+
+def _options(weights: Array) -> Array:
+    """How many options each column has, (N,); at least one, as all-zero weights choose option 0."""
+    return np.asarray(np.maximum((weights != 0).sum(axis=0), 1))
 
 
 def _expand(lanes: Lanes, weights: Array, n: int) -> Lanes:
@@ -128,3 +179,41 @@ def _split(lanes: Lanes) -> list[Lanes]:
     return [
         Lanes([a[k : k + LANES_AT_ONCE] for a in lanes.answers], lanes.probability[k : k + LANES_AT_ONCE]) for k in cuts
     ]
+
+
+# ---------------------------------------------------------------- how many leaves there will be
+
+
+@dataclass
+class Diving(Enumerating):
+    """Chance that goes on at random where the answers end, and multiplies up the options it had; below (lanes,)."""
+
+    below: Array = field(default_factory=lambda: np.ones(1))
+
+    def unanswered(self, weights: Array) -> Array:
+        """One of the options of non-zero weight, all alike."""
+        with np.errstate(over="ignore"):
+            self.below = self.below * _combinations(weights, weights.shape[-1] // len(self.below))
+        wanted = np.floor(scattered(np.arange(weights.shape[-1]), self.calls) * _options(weights))
+        return np.asarray((np.cumsum(weights != 0, axis=0) > wanted).argmax(axis=0))
+
+
+def _estimate(program: Program[Result], frontier: Sequence[Lanes], n: int) -> float:
+    """Leaves below a frontier: the mean product of the options along random dives, Knuth's size of a search tree."""
+    return sum(len(lanes) * _mean_below(program, lanes, n) for lanes in frontier)
+
+
+def _mean_below(program: Program[Result], lanes: Lanes, n: int) -> float:
+    """Mean number of leaves below a lane, from DIVES dives spread over the lanes."""
+    start = np.arange(DIVES) * len(lanes) // DIVES
+    diving = Diving([answers[start] for answers in lanes.answers], below=np.ones(DIVES))
+    program(np.arange(DIVES * n), diving)
+    return float(diving.below.mean())
+
+
+def scattered(column: Array, call: int) -> Array:
+    """A fixed number in [0, 1) for every column (N,) and call that looks random: SplitMix64 of both."""
+    z = column.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(call * 0xD1B54A32D192ED03 % 2**64)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        z = (z ^ (z >> np.uint64(shift))) * np.uint64(factor)
+    return np.asarray(((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53)

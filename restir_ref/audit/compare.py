@@ -1,0 +1,130 @@
+"""A dump held against what its pass should have computed, term by term, in the order of computation."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from restir_ref.audit.load import Dump, recorded
+from restir_ref.audit.recorded import Pass, Terms, densities
+from restir_ref.batch import Array, ratio
+
+Compute = Callable[[Pass], Terms]
+"""All terms of a recorded pass; the right ones, or those of a classic mistake."""
+
+UNDERFLOW = float(np.finfo(np.float32).tiny)
+"""What is smaller may be dumped as 0."""
+
+SMALL_M, SMALL_W = np.array(1e-2), np.array(1e-2)
+"""m below the first, and w below the second times its sum, are held to an absolute tolerance: they hardly matter."""
+
+ALL = np.array(True)
+"""Compare everywhere."""
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """A term that is not what it should be: its worst place [input(s), column], and in how many columns it is wrong."""
+
+    term: str
+    where: Sequence[int]
+    expected: float
+    found: float
+    columns: int
+
+    def __str__(self) -> str:
+        inputs = "".join(f"[{i}]" for i in self.where[:-1])
+        size = "1 column" if self.columns == 1 else f"{self.columns} columns"
+        return (
+            f"{self.term}{inputs} in column {self.where[-1]}: expected {self.expected:.7g}, found {self.found:.7g} "
+            f"(wrong in {size})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """Expected and found values of a term, which of them to compare, and the tolerance of each; (..., N)."""
+
+    term: str
+    expected: Array
+    found: Array
+    compared: Array
+    tolerance: Array
+
+    @property
+    def wrong(self) -> Array:
+        """Where found is not expected."""
+        off = ~(abs(self.found - self.expected) <= self.tolerance)
+        flushed = (self.found == 0) & (abs(self.expected) < UNDERFLOW)
+        return np.asarray(off & ~flushed & self.compared)
+
+    def worst(self) -> Wrong:
+        """The place where the error is largest in units of its tolerance."""
+        excess = np.where(self.wrong, abs(self.found - self.expected) / np.maximum(self.tolerance, UNDERFLOW), -1)
+        place = tuple(int(k) for k in np.unravel_index(excess.argmax(), excess.shape))
+        expected = np.broadcast_to(self.expected, self.found.shape)[place]
+        columns = int(self.wrong.reshape(-1, self.wrong.shape[-1]).any(axis=0).sum())
+        return Wrong(self.term, place, float(expected), float(self.found[place]), columns)
+
+
+def checks(dump: Dump, compute: Compute, rtol: float, skipped: Sequence[str] = ()) -> Iterator[Check]:
+    """Every dumped term that is not skipped beside the computed one."""
+    p, found = replace(dump.recorded, blur=rtol), dump.found
+    terms, chosen, settled = _computed(p, compute)
+    for term, compared, follows in _given_twice(p, terms):
+        if term in found and term not in skipped:
+            due = follows()
+            yield Check(term, due, found[term], compared, rtol * due)
+    for term, expected, compared, slack in _results(p, terms):
+        if term in found:
+            yield Check(term, expected, found[term], compared, rtol * (expected + slack))
+    if p.s is not None:
+        yield Check("s", np.where(settled, p.s, chosen), p.s, ~settled, np.zeros(p.s.shape))
+    for term, expected, compared in (("W_Y", terms.W_Y, settled), ("c_Y", terms.c_Y, ALL)):
+        if term in found:
+            yield Check(term, expected, found[term], compared, rtol * expected)
+
+
+def _results(p: Pass, terms: Terms) -> Iterator[tuple[str, Array, Array, Array]]:
+    """m where it matters, that is where w would not be 0 anyway; w and its sum."""
+    yield "m", terms.m, (p.J > 0) & (p.W > 0) & (p.p_hat > 0), SMALL_M
+    yield "w", terms.w, ALL, SMALL_W * terms.w_sum
+    yield "w_sum", terms.w_sum, ALL, np.zeros(1)
+
+
+def _given_twice(p: Pass, terms: Terms) -> Iterator[tuple[str, Array, Callable[[], Array]]]:
+    """Numbers of the dump that follow from others: a shift and its inverse cancel, canonical inputs are not shifted."""
+    M, N = p.p_hat.shape
+    ours = np.broadcast_to(p.canonical[:, None], (M, N))
+    yield "J", ours, lambda: np.ones((M, N))
+    if not p.rated:
+        return
+    reached, own = np.broadcast_to((p.J > 0)[:, None], (M, M, N)), np.eye(M, dtype=bool)[..., None]
+    to_ours = np.broadcast_to(p.canonical[:, None], (M, M, N))
+    known = reached & (own | to_ours)
+    yield "p_hat_own", ours, lambda: p.p_hat
+    yield "p_hat_back", known, lambda: np.where(to_ours, p.p_hat[:, None], p.p_hat_own[:, None])
+    yield "J_back", known, lambda: np.where(to_ours, 1, ratio(np.ones((M, N)), p.J)[:, None])
+    yield "p_hat_from", reached, lambda: densities(terms.of)
+
+
+def _computed(p: Pass, compute: Compute) -> tuple[Terms, Array, Array]:
+    """Terms, the inputs that the numbers select, and in which columns a recorded s is one of those allowed.
+
+    Numbers near a boundary may select either side.  Given an allowed s, terms are those of s.
+    """
+    free = compute(replace(p, s=None))
+    if p.s is None:
+        return free, free.s, free.clear
+    chosen = free.s if p.u else free.w.argmax(axis=0)
+    unclear = ~free.clear if p.u else np.ones(len(chosen), dtype=bool)
+    possible = np.take_along_axis(free.w, p.s[None], axis=0)[0] > 0
+    allowed = (free.w_sum == 0) | (possible & ((p.s == chosen) | unclear))
+    return compute(replace(p, s=np.where(allowed, p.s, chosen))), chosen, allowed
+
+
+def columns(dump: Dump, index: Array) -> Dump:
+    """The same dump with these columns only."""
+    whole = ("canonical", "cap")
+    found = {name: values if name in whole else values[..., index] for name, values in dump.found.items()}
+    return Dump(recorded(found, dump.recorded.mis), found)
