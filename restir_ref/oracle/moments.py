@@ -107,3 +107,19 @@ def mapped(Z: Moments, A: Array) -> Moments:
 def variance(Z: Moments) -> Array:
     """Var[Z] per entry (D,)."""
     return np.asarray(np.diag(Z.second) - Z.mean**2)
+
+
+def copies(one: Moments, n: Array) -> Moments:
+    """Moments of the average of n independent copies of Z; n (D,) may differ between its independent parts."""
+    mean = np.outer(one.mean, one.mean)
+    return Moments(one.mean, mean + (one.second - mean) / n[:, None])
+
+
+def reused(frame: Frame, pixel: int, n: Array, mis: Weights) -> Operator:
+    """The operator of a pixel's pass over n[i] samples of every pixel i, (frame.n,), n[pixel] > 0.
+
+    They enter as their average, of confidence n[i]; Z holds one average per pixel, see `copies`.
+    """
+    K = frame.cells.v.shape[-1]
+    pixels = [pixel, *(i for i in range(frame.n) if i != pixel and n[i] > 0)]
+    return operator([Source(i * K, frame, i, n[i]) for i in pixels], frame.n * K, mis)
