@@ -12,7 +12,31 @@ from figures.errors import FigureError
 from figures.figure import PRESETS, Figure
 from figures.store import canonical
 
-MODULES: tuple[str, ...] = ("figures.gris_f02", "figures.gris_f07")
+MODULES: tuple[str, ...] = (
+    "figures.gris_f02",
+    "figures.gris_f03",
+    "figures.gris_f04",
+    "figures.gris_f07",
+    "figures.gris_f07c",
+    "figures.gris_f08",
+    "figures.gris_f09",
+    "figures.gris_f10",
+    "figures.gris_e46",
+    "figures.gris_c06",
+    "figures.gris_c08",
+    "figures.gris_c19",
+    "figures.gris_c21",
+    "figures.zoo",
+    "figures.gpt_f03",
+    "figures.mcmc_1d",
+    "figures.mcmc_c09",
+    "figures.gris_t1",
+    "figures.gris_a2",
+    "figures.gris_e33",
+    "figures.gris_e40",
+    "figures.gris_e41",
+    "figures.gris_c15",
+)
 ROOT = Path(__file__).resolve().parent.parent
 ID = re.compile(r"[A-Z][A-Z0-9]*-[A-Za-z0-9-]+")
 

@@ -168,7 +168,7 @@ SELECTION_BUGS = (
     Bug(
         "divided by M twice",
         "Weights already contain 1/M, and the old formula W = sum w / (M p_hat) is kept.",
-        "dark by exactly 1/M, at every number of candidates",
+        "dark to 1/M, at every number of candidates",
         "[GRIS Eq. 2, 22]",
         reference_scene,
         right=TWO,
