@@ -26,7 +26,7 @@ HYPOTHESIS_PROFILE ?= ci
 export HYPOTHESIS_PROFILE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup figures figures-paper test lint check evidence bench clean
+.PHONY: help setup figures figures-paper test lint check notebooks evidence bench clean
 
 help:  ## list the targets
 	@echo 'usage: make TARGET [ARGS="..."] [JOBS=2] [OUT=out] [PYTHON=python3]'
@@ -52,6 +52,9 @@ lint: $(STAMP)  ## ruff and mypy --strict
 	$(PY) -m mypy --strict
 
 check: lint test  ## all that must pass before a change is handed in
+
+notebooks: $(STAMP)-notebooks  ## open the notebooks in Jupyter; ARGS="--no-browser" on a machine without one
+	$(PY) -m jupyterlab notebooks $(ARGS)
 
 evidence: $(STAMP)  ## the long runs whose results are committed; hours
 	@if [ -f benchmarks/evidence.py ]; then $(PY) benchmarks/evidence.py $(ARGS); \
@@ -90,4 +93,9 @@ $(STAMP): pyproject.toml constraints.txt
 	@echo 'Installing the pinned packages into $(VENV); the first time takes about a minute.'
 	@$(PY) -m pip install -qq --upgrade pip
 	@$(PY) -m pip install -qq -c constraints.txt -e '.[dev]'
+	@touch $@
+
+$(STAMP)-notebooks: $(STAMP)
+	@echo 'Installing Jupyter into $(VENV).'
+	@$(PY) -m pip install -qq -c constraints.txt -e '.[notebooks]'
 	@touch $@

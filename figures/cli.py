@@ -5,13 +5,15 @@ import json
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from figures import ledger, registry, report, run, scan, session, tables, verdicts
+from figures import cluster, jobs, ledger, registry, report, run, scan, session, tables, verdicts
 from figures.errors import FigureError
 from figures.figure import PRESETS
+from figures.jobs import Crew
 from figures.progress import DISABLE, Progress
-from figures.registry import Project
+from figures.registry import Entry, Project
 
 SEED = 20220711
 FOLDER = Path("out")
@@ -71,12 +73,18 @@ LEDGER = "Show every claim with its tests, the figures that declare it, and its 
 def _run_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("ids", nargs="*", metavar="ID", help="figures to run (default: all; see `list`)")
     command.add_argument("--preset", choices=PRESETS, default="quick", help="size of the run (default: %(default)s)")
-    command.add_argument(
+    workers = command.add_mutually_exclusive_group()
+    workers.add_argument(
         "--jobs",
         type=_jobs,
         default=1,
         metavar="N",
         help="worker processes; 0 or auto: one per core; results do not depend on it (default: %(default)s)",
+    )
+    workers.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="compute on the Dask cluster whose scheduler is there, such as tcp://host:8786 (needs '.[dask]')",
     )
     command.add_argument("--seed", type=_seed, default=SEED, metavar="S", help="root seed (default: %(default)s)")
     command.add_argument(
@@ -122,11 +130,19 @@ def _run(options: argparse.Namespace, project: Project) -> int:
     entries, rows = registry.load(project.modules), ledger.load(project.ledger)
     chosen = tuple(registry.select(entries, options.ids))
     _refuse(list(ledger.unknown(rows, chosen)))
-    request = session.Request(chosen, options.preset, options.seed, options.jobs, options.out)
-    status, judged = run.run(request, rows, entries, Progress(options.progress))
+    progress = Progress(options.progress)
+    with _crew(options, chosen, progress) as crew:
+        request = session.Request(chosen, options.preset, options.seed, crew, options.out)
+        status, judged = run.run(request, rows, entries, progress)
     print(tables.summary(judged, tables.crashes(options.out)))
     print(f"report: {options.out / 'index.html'}")
     return status
+
+
+def _crew(options: argparse.Namespace, chosen: Sequence[Entry], progress: Progress) -> AbstractContextManager[Crew]:
+    if options.dask is None:
+        return nullcontext(jobs.crew(options.jobs))
+    return cluster.crew(options.dask, chosen, progress.say)
 
 
 def _report(options: argparse.Namespace, project: Project) -> int:

@@ -163,7 +163,10 @@ def check_independent(a: Arrays) -> list[Claim]:
     return [
         Claim("GRIS-E41", criteria.between(used, 0, 1), "seven domains: largest variance over its bound"),
         *check_extreme(a),
-        *(Claim("GRIS-E41", slope, f"{mis}: slope, 1/n as copies are independent") for mis, slope in zip(ROBUST, slopes, strict=True)),
+        *(
+            Claim("GRIS-E41", slope, f"{mis}: slope, 1/n as copies are independent")
+            for mis, slope in zip(ROBUST, slopes, strict=True)
+        ),
         Claim("GRIS-C04", criteria.between(growing, 0, 1), "the bound holds: largest variance over it"),
         *(
             Claim("GRIS-C04", s, f"the bound itself, not the variance, for |R| = M^{x:g}: slope")

@@ -44,7 +44,7 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
         pixels = [CENTRE, *(i for i in range(frame.n) if i != CENTRE)]
         found = [[exact(frame, pixels, mis, n) for n in preset["n"]] for mis in NAMES]
         bias, relative_variance = np.array(found).transpose(2, 0, 1)
-        alone = np.array([exact(frame, [CENTRE], "constant", n) for n in preset["n"]]).T
+        alone = np.array([exact(frame, (CENTRE,), "constant", n) for n in preset["n"]]).T
         return {"bias": bias, "variance": relative_variance, "canonical": alone}
     batches = range(preset["batches"])
     return {"estimates": np.stack([sampled(chunk["mis"], chunk["n"], preset["columns"], Live(rng)) for _ in batches])}

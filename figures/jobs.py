@@ -10,10 +10,11 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from multiprocessing import resource_tracker
 from typing import Any, ParamSpec, TypeVar
@@ -107,16 +108,44 @@ def executor(jobs: int) -> Executor:
     return Workers(jobs, mp_context=context, initializer=_worker)
 
 
+class Lost(Exception):
+    """Workers died with their chunks: the message says which and why, as far as it is known."""
+
+
+KILLED = "a worker process was killed, perhaps for want of memory (fewer --jobs need less)"
+
+
 @contextmanager
 def pool(jobs: int) -> Iterator[Executor]:
-    """The executor for a block of work; a block that ends in an error does not wait for chunks under way."""
+    """The executor for a block of work; a block that ends in an error does not wait for chunks under way.
+
+    Raises Lost for a killed worker process.
+    """
     workers = executor(jobs)
     try:
         yield workers
+    except BrokenExecutor as error:
+        abandon(workers)
+        raise Lost(KILLED) from error
     except BaseException:
         abandon(workers)
         raise
     workers.shutdown()
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Who computes the chunks: how many at a time, the executor for a block of work, and words for the manifest."""
+
+    size: int
+    pool: Callable[[], AbstractContextManager[Executor]]
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+
+def crew(jobs: int) -> Crew:
+    """Workers on this machine; 0 for all its cores."""
+    size = jobs or cores()
+    return Crew(size, partial(pool, size))
 
 
 def completed(pool: Executor, work: Iterable[Job], window: int) -> Iterator[Result]:

@@ -3,7 +3,7 @@
 import json
 import platform
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -25,8 +25,12 @@ def now() -> str:
 
 def environment() -> dict[str, Any]:
     """What the results may depend on besides the seed: versions, platform, commit."""
-    versions = {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
-    return {"versions": versions, "platform": platform.platform(), "git": git(ROOT)}
+    return {"versions": versions(PACKAGES), "platform": platform.platform(), "git": git(ROOT)}
+
+
+def versions(packages: Iterable[str]) -> dict[str, str | None]:
+    """The versions of Python and of packages, null where one is not installed."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in packages}}
 
 
 def _version(package: str) -> str | None:

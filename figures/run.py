@@ -5,7 +5,7 @@ Every chunk is stored once it is done: whatever ends a run early, the same comma
 
 import time
 from collections.abc import Iterator, Mapping
-from concurrent.futures import BrokenExecutor
+from dataclasses import dataclass
 
 from figures import jobs, outdir, plan, report, session, store
 from figures.finish import crash, finish
@@ -15,12 +15,15 @@ from figures.registry import Entry
 from figures.session import Request, Session
 from figures.verdicts import Judged
 
-KILLED = (
-    "a worker process was killed, perhaps for want of memory. What was computed is stored: "
-    "the same command goes on from there; fewer --jobs need less memory"
-)
-INTERRUPTED = "interrupted. What was computed is stored: the same command goes on from there"
-STATUS = {"": 0, KILLED: 1, INTERRUPTED: 130}
+RESUME = "What was computed is stored: the same command goes on from there"
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How the work ended: in words, and the exit status if it ended early (0 if not)."""
+
+    words: str = "finished"
+    status: int = 0
 
 
 def run(
@@ -31,15 +34,15 @@ def run(
         mine = session.begin(request, ledger, progress.say)
         session.note(mine, "running")
         ending = _work(mine, progress)
-        session.note(mine, ending.partition(".")[0] or "finished")
+        session.note(mine, ending.words)
         judged = report.write(request.out, ledger, registry)
-    if ending:
-        progress.say(ending)
-    return STATUS[ending] or _status(mine, judged), judged
+    if ending.status:
+        progress.say(f"{ending.words}. {RESUME}")
+    return ending.status or _status(mine, judged), judged
 
 
-def _work(mine: Session, progress: Progress) -> str:
-    """Compute and finish; returns what ended the run early, in words, or nothing."""
+def _work(mine: Session, progress: Progress) -> Ending:
+    """Compute and finish."""
     total = sum(len(numbers) for numbers in mine.missing.values())
     try:
         with progress.bar(total):
@@ -48,16 +51,16 @@ def _work(mine: Session, progress: Progress) -> str:
             if total:
                 _compute(mine, progress)
     except KeyboardInterrupt:
-        return INTERRUPTED
-    except BrokenExecutor:
-        return KILLED
-    return ""
+        return Ending("interrupted", 130)
+    except jobs.Lost as lost:
+        return Ending(str(lost), 1)
+    return Ending()
 
 
 def _compute(mine: Session, progress: Progress) -> None:
-    workers = session.workers(mine.request)
-    with jobs.pool(workers) as pool:
-        for result in jobs.completed(pool, _queue(mine), window=1 if workers == 1 else 2 * workers):
+    crew = mine.request.crew
+    with crew.pool() as pool:
+        for result in jobs.completed(pool, _queue(mine), window=1 if crew.size == 1 else 2 * crew.size):
             _take(mine, result, progress)
             _finish_if_complete(mine, result.job.figure, progress)
 

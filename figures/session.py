@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from figures import jobs, manifest, plan
+from figures import manifest, plan
+from figures.jobs import Crew
 from figures.ledger import Row
 from figures.plan import Plan
 from figures.record import Record
@@ -14,12 +15,12 @@ from figures.registry import Entry
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked: figures, preset, root seed, workers (0 for all cores) and the folder of results."""
+    """What was asked: figures, preset, root seed, who computes, and the folder of results."""
 
     entries: tuple[Entry, ...]
     preset: str
     seed: int
-    jobs: int
+    crew: Crew
     out: Path
 
 
@@ -49,11 +50,6 @@ def begin(request: Request, ledger: Mapping[str, Row], warn: Callable[[str], obj
     return Session(request, ledger, plans, missing, reused, dict.fromkeys(plans, 0.0))
 
 
-def workers(request: Request) -> int:
-    """The number of workers asked for."""
-    return request.jobs or jobs.cores()
-
-
 def note(session: Session, status: str) -> None:
     """Write the manifest."""
     request = session.request
@@ -61,7 +57,8 @@ def note(session: Session, status: str) -> None:
         "status": status,
         "preset": request.preset,
         "seed": request.seed,
-        "jobs": workers(request),
+        "jobs": request.crew.size,
+        **request.crew.about,
         "started": session.started,
         "finished": None if status == "running" else manifest.now(),
         **session.environment,

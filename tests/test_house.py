@@ -20,9 +20,10 @@ MAY_IMPORT = {
     TRANSPORT: {THEORY, TRANSPORT},
     **{world: {THEORY, TRANSPORT, world} for world in WORLDS},
     "figures": {THEORY, TRANSPORT, *WORLDS, "figures"},
+    "notebooks": {THEORY, TRANSPORT, *WORLDS, "figures", "notebooks"},
 }
-FLOORS = (*MAY_IMPORT, "tests", "benchmarks", "notebooks")
-PACKAGES = (THEORY, *WORLDS, "figures")
+FLOORS = (*MAY_IMPORT, "tests", "benchmarks")
+PACKAGES = (THEORY, *WORLDS, "figures", "notebooks")
 
 # ---------------------------------------------------------------- imports
 

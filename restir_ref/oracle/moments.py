@@ -63,11 +63,12 @@ def independent(parts: Sequence[Moments]) -> Moments:
 
 
 def drawn(frame: Frame) -> Moments:
-    """Moments of one fresh sample per pixel with W = 1/p; frames with one sampling technique."""
+    """Moments of one initial sample per pixel, W = 1/p, null where p_hat = 0; frames with one technique."""
     if len(frame.cells.pdf) != 1:
         raise ValueError(f"drawn() knows one technique per pixel, but this scene has {len(frame.cells.pdf)}.")
     ids = frame.ids(np.arange(frame.n))
-    v, pdf = frame.cells.v[ids], frame.cells.pdf[0, ids]
+    pdf = np.where(frame.cells.p_hat[ids] > 0, frame.cells.pdf[0, ids], 0)
+    v = frame.cells.v[ids]
     pixels = [Moments(np.where(p > 0, w, 0), np.diag(ratio(w, p))) for p, w in zip(pdf, v, strict=True)]
     return independent(pixels)
 
@@ -83,7 +84,7 @@ def operator(sources: Sequence[Source], D: int, mis: Weights) -> Operator:
         r = one if y.c_over_m is None else y.c_over_m
         entry = source.start + x
         u[entry] += y.p_hat * y.mW
-        np.add.at(L, (y.x, entry), r * y.mW)
+        np.add.at(L, (y.x, entry), np.where(y.p_hat > 0, r * y.mW, 0))  # null samples are never chosen
         np.add.at(Q, (y.x, entry), ratio(r**2 * y.mW, y.p_hat))
     return Operator(L, u, Q)
 

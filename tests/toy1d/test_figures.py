@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 
 from figures import gris_c06, gris_f09, gris_f10, style
 from figures.exact import Loop
-from figures.figure import Arrays, Figure, undeclared, verdict_of
+from figures.figure import Arrays, Figure, undeclared, verdict_of, worst
 from figures.jobs import stream
+from figures.ledger import load
 from tests.core.stubs import live
 from toy1d import quotient, two_pixels
 
@@ -34,7 +36,7 @@ def worst_of_each(figure: Figure, arrays: Arrays) -> dict[str, str]:
 
 def expected(figure: Figure) -> dict[str, str]:
     """What the ledger expects of the figure's claims, all of which pass."""
-    rows = load(LEDGER)
+    rows = load(Path(style.__file__).with_name("ledger.json"))
     found = {id_: rows[id_].expected["quick"] for id_ in figure.claims}
     assert set(found.values()) <= {"reproduced", "reproduced with caveat"}
     return found

@@ -1,0 +1,142 @@
+"""Every notebook is clean, runs from top to bottom in this process, and ends with the facts that it tells."""
+
+import json
+import sys
+
+import pytest
+
+from notebooks import one_dimension, show
+from tests.checkout import ROOT
+
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+LONGEST = 14
+"""Lines of a code cell."""
+
+
+def read(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def code(notebook):
+    return ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+
+
+def faults(path):
+    """What is wrong with the file of a notebook, apart from its contents."""
+    text, notebook = path.read_text(encoding="utf-8"), read(path)
+    if json.dumps(notebook, indent=1, ensure_ascii=False, sort_keys=True) + "\n" != text:
+        yield "not as Jupyter writes it"
+    if (notebook["nbformat"], notebook["nbformat_minor"]) != (4, 5):
+        yield "not format 4.5"
+    if notebook["metadata"].keys() != {"kernelspec", "language_info"}:
+        yield "odd metadata"
+    ids = [cell["id"] for cell in notebook["cells"]]
+    if len(set(ids)) < len(ids):
+        yield "ids twice"
+    for cell in notebook["cells"]:
+        if cell.get("outputs") or cell.get("execution_count") is not None:
+            yield f"{cell['id']} has outputs"
+        if cell["cell_type"] == "code" and "".join(cell["source"]).count("\n") >= LONGEST:
+            yield f"{cell['id']} is too long"
+
+
+def run(notebook):
+    """The names that a notebook leaves behind."""
+    names = {"__name__": "notebook"}
+    for number, source in enumerate(code(notebook)):
+        exec(compile(source, f"code cell {number}", "exec"), names)
+    return names
+
+
+every_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+
+
+def test_there_are_three_notebooks_in_order():
+    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_"]
+
+
+@every_notebook
+def test_a_notebook_is_stored_clean(path):
+    assert list(faults(path)) == []
+
+
+SPOILED = {
+    "outputs": lambda cell: cell.update(outputs=[{"output_type": "stream"}]),
+    "a count": lambda cell: cell.update(execution_count=3),
+    "a long cell": lambda cell: cell.update(source=["x = 1\n"] * LONGEST),
+    "an id twice": lambda cell: cell.update(id="cell-00"),
+}
+
+
+@pytest.mark.parametrize("spoil", SPOILED.values(), ids=SPOILED)
+def test_a_spoiled_notebook_is_noticed(tmp_path, spoil):
+    notebook = read(NOTEBOOKS[0])
+    spoil(next(cell for cell in notebook["cells"] if cell["cell_type"] == "code"))
+    path = tmp_path / "spoiled.ipynb"
+    path.write_text(json.dumps(notebook, indent=1, ensure_ascii=False, sort_keys=True) + "\n")
+    assert len(list(faults(path))) == 1
+
+
+def test_from_ris_to_gris_tells_the_truth():
+    names = run(read(NOTEBOOKS[0]))
+    plain, truth = names["plain"], names["truth"]
+    assert abs(plain.mean() - truth) < 4 * plain.std() / 100 < 0.05 * truth
+    assert names["without"].mean() == pytest.approx(1, abs=0.01)
+    assert abs(names["without"] - 1).min() > 0.2
+    assert names["lost"].pop("constant") > 0.2
+    assert max(map(abs, names["lost"].values())) < 1e-12
+    assert names["ends"]["none"].std() > 10 * names["ends"]["1"].std() > 0
+
+
+def test_is_my_estimator_unbiased_tells_the_truth():
+    names = run(read(NOTEBOOKS[1]))
+    assert "one seed for two passes" in str(names["hidden"])
+    assert names["verdict"].startswith("Unbiased")
+    assert names["found"].startswith("Biased")
+    assert [name for name, words in names["family"].items() if not words.startswith("Unbiased")] == ["constant"]
+
+
+def test_find_the_bug_runs_and_gives_nothing_away(capsys):
+    names = run(read(NOTEBOOKS[2]))
+    assert list(names["suspects"]) == list("ABCDEF")
+    shown = capsys.readouterr().out + str(names["suspects"])
+    assert not [name for name in names["lab"].names() if name in shown]
+
+
+# ---------------------------------------------------------------- controls
+
+
+def png(picture):
+    return picture[1:4] == b"PNG"
+
+
+def test_a_picture_is_shown_as_png_in_the_house_style():
+    assert png(show.show(one_dimension.shift)._repr_png_())
+
+
+def test_a_control_redraws_the_picture():
+    pytest.importorskip("ipywidgets", reason="needs ipywidgets: pip install '.[notebooks]'")
+    box = show.explore(one_dimension.frozen, cap=["1", "none"])
+    cap, image = box.children
+    before = image.value
+    cap.value = "none"
+    assert png(before)
+    assert png(image.value)
+    assert image.value != before == show.show(one_dimension.frozen, "1").png
+
+
+def test_numbers_slide_in_order_from_the_first_one_given():
+    pytest.importorskip("ipywidgets", reason="needs ipywidgets: pip install '.[notebooks]'")
+    slider, _ = show.explore(one_dimension.ris, M=[4, 1, 2]).children
+    assert (slider.options, slider.value) == ((1, 2, 4), 4)
+
+
+def test_without_widgets_the_first_setting_is_shown(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipywidgets", None)
+    assert show.explore(one_dimension.frozen, cap=["1", "none"]) == show.show(one_dimension.frozen, "1")
+
+
+def test_a_table_is_text_and_html():
+    table = show.Table(["a", "b"], [("x < y", 1)])
+    assert str(table) == "a      b\nx < y  1"
+    assert "x &lt; y" in table._repr_html_()
