@@ -2,5 +2,5 @@
 
 Nothing here knows whether d is 2 or 3.  A world hands in a `Space` (how to make frames and sample
 balls, simplices and visible normals in its dimension), surfaces, and sensors.  Read `vectors`,
-`space`, `lobes`, `materials`, `scene`, then `paths` and `shifts`.
+`space`, `lobes`, `materials`, `scene`, `rays`, then `paths` and `shifts`.
 """

@@ -12,7 +12,7 @@ from restir_ref.batch import Array, take
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import Path, Tracer
-from restir_ref.transport.scene import vertex
+from restir_ref.transport.rays import vertex
 from restir_ref.transport.shifts import replay
 from restir_ref.transport.vectors import normalize
 

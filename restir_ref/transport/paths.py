@@ -17,7 +17,8 @@ import numpy as np
 from restir_ref.batch import Array, ratio
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
-from restir_ref.transport.scene import Scene, arrive, emitted, light_pdf, sample_light, visible
+from restir_ref.transport.rays import arrive, emitted, light_pdf, sample_light, visible
+from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import norm
 
 
@@ -73,7 +74,7 @@ class Tracer:
 
     def lobe_number(self, u: Array, i: int) -> Array:
         """The number that chooses the lobe at x_i, (N,)."""
-        return u[self._start(i)]
+        return np.asarray(u[self._start(i)])
 
     def direction_numbers(self, u: Array, i: int) -> Array:
         """The numbers of the direction leaving x_i, (d-1, N)."""
@@ -145,14 +146,10 @@ def scatter(t: Tracer, v: Vertex, u: Array, i: int) -> Scatter:
     P = mat.lobe_shares(table, v)
     lobe = mat.choose_lobe(P, t.lobe_number(u, i))
     local = mat.sample_lobe(table, space, v, lobe, t.direction_numbers(u, i))
-    lost = (local == 0).all(axis=0)
+    lost = local[-1] == 0
     local[-1] = np.where(lost, 1.0, local[-1])
-    f, p = mat.evaluate_lobe(table, space, v, lobe, local)
-    P_l = P[lobe, np.arange(len(lobe))]
-    delta = mat.lobe_roughness(table, v, lobe) == 0
-    weight = np.where(lost, 0.0, ratio(f, np.where(delta, P_l, P_l * p)))
-    p_all = P_l * p if table.L == 1 else np.where(delta, 0.0, mat.evaluate_all(table, space, v, P, local)[1])
-    return Scatter(lobe, P, space.to_world(v.n, local), weight, P_l * p, p_all)
+    weight, p, p_all = mat.scatter_lobe(table, space, v, P, lobe, local)
+    return Scatter(lobe, P, space.to_world(v.n, local), np.where(lost, 0.0, weight), p, p_all)
 
 
 def light_leaf(t: Tracer, v: Vertex, P: Array, u: Array, i: int) -> tuple[Leaf, Array]:
@@ -166,7 +163,8 @@ def light_leaf(t: Tracer, v: Vertex, P: Array, u: Array, i: int) -> tuple[Leaf, 
     f, p_all = mat.evaluate_all(s.materials, s.space, v, P, s.space.to_local(v.n, w))
     seen = (cos_y > 0) & (f > 0).any(axis=0)
     p_light = light.pdf_area * r ** (s.space.d - 1) / np.where(seen, cos_y, 1)
-    seen &= visible(s, v.x, light.y)
+    facing = np.flatnonzero(seen)
+    seen[facing] = visible(s, v.x.take(facing, axis=-1), light.y.take(facing, axis=-1))
     bare = np.where(seen, light.emission / p_light, 0)
     return Leaf(f * bare * ratio(p_light, p_light + p_all), bare, p_light), w
 

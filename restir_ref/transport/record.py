@@ -127,4 +127,4 @@ def _padded(parts: object) -> Array:
 def _at(stack: Array, i: Array) -> Array:
     """stack[i[n], ..., n] for every column n."""
     index = np.broadcast_to(i, (1, *stack.shape[1:]))
-    return np.take_along_axis(stack, index, axis=0)[0]
+    return np.asarray(np.take_along_axis(stack, index, axis=0)[0])

@@ -21,7 +21,7 @@ from restir_ref.transport.paths import (
     light_leaf,
     scatter,
 )
-from restir_ref.transport.scene import arrive, emitted, light_pdf, vertex, visible
+from restir_ref.transport.rays import arrive, emitted, light_pdf, vertex, visible
 from restir_ref.transport.vectors import norm
 
 
@@ -113,14 +113,13 @@ def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     z = vertex(s, x.z, x.prim, -w)
     P = mat.lobe_shares(table, y.v)
     local = space.to_local(y.v.n, w)
-    f, p = mat.evaluate_lobe(table, space, y.v, x.lobe_in, local)
-    p = P[x.lobe_in, np.arange(len(r))] * p
+    weight, p, p_all = mat.scatter_lobe(table, space, y.v, P, x.lobe_in, local)
     far = _roughness_of_z(t, x, z)
     legal = connectable(t.rule, mat.lobe_roughness(table, y.v, x.lobe_in), far, r) & (p > 0)
-    p_out, E = _beyond(t, x, z, _all_pdf(t, y.v, P, local), r)
+    p_out, E = _beyond(t, x, z, p_all, r)
     A = p * z.o[-1] / r ** (space.d - 1) * p_out
     legal &= (A > 0) & visible(s, y.v.x, x.z)
-    return y.T * ratio(f, p) * E, A, legal
+    return y.T * weight * E, A, legal
 
 
 def _roughness_of_z(t: Tracer, x: Path, z: Vertex) -> Array:
@@ -128,10 +127,6 @@ def _roughness_of_z(t: Tracer, x: Path, z: Vertex) -> Array:
     table = t.scene.materials
     by_lobe = np.where(x.nee & (x.c == x.k), mat.roughest(table, z), mat.lobe_roughness(table, z, x.lobe_out))
     return np.where(x.c > x.k, 1.0, by_lobe)
-
-
-def _all_pdf(t: Tracer, v: Vertex, P: Array, local: Array) -> Array:
-    return mat.evaluate_all(t.scene.materials, t.scene.space, v, P, local)[1]
 
 
 def _beyond(t: Tracer, x: Path, z: Vertex, p_all_y: Array, r: Array) -> tuple[Array, Array]:

@@ -35,7 +35,10 @@ class Space(Protocol):
         """Barycentric coordinates (d-1, N) of a uniform point of a simplex with d corners; the rest is 1 - sum."""
 
     def visible(self, u: Array, v: Array) -> Array:
-        """A normal of the unit hemisphere, visible from v (d, N), uniform over what v sees of it; from u (d-1, N)."""
+        """A normal m (d, N) of the unit hemisphere with density max(0, m.v) 2 / (C_d (1 + v_z)), from u (d-1, N).
+
+        The normals that v (d, N), v_z >= 0, sees, each by the area that v sees of it: uniform over their projection.
+        """
 
     def unvisible(self, m: Array, v: Array) -> Array:
         """The inverse of `visible`."""
@@ -43,9 +46,9 @@ class Space(Protocol):
 
 def ball_volume(d: int) -> float:
     """C_d = |B^(d-1)| = integral of the cosine over a hemisphere of S^(d-1): 2 in flatland, pi in 3D."""
-    return pi ** ((d - 1) / 2) / gamma((d + 1) / 2)
+    return float(pi ** ((d - 1) / 2) / gamma((d + 1) / 2))
 
 
 def sphere_area(d: int) -> float:
     """|S^(d-1)|: 2 pi in flatland, 4 pi in 3D."""
-    return 2 * pi ** (d / 2) / gamma(d / 2)
+    return float(2 * pi ** (d / 2) / gamma(d / 2))

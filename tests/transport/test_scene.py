@@ -1,0 +1,116 @@
+"""Compiled scenes: affine maps, sizes, and what is refused, with the offending value in the message."""
+
+from dataclasses import replace
+from math import factorial
+
+import numpy as np
+import pytest
+
+from restir_ref.transport.materials import Layer, Material
+from restir_ref.transport.scene import EDGE, Ball, Facet, scene
+from tests.transport.rooms import MATTE, soup, walls
+from tests.transport.spaces import SPACES
+
+every_space = pytest.mark.parametrize("space", SPACES.values(), ids=SPACES)
+
+
+@every_space
+def test_the_maps_give_a_facet_s_corners_unit_coordinates_and_height_zero(space):
+    s, d = soup(space, 1), space.d
+    at = np.einsum("fsk,cks->fcs", s.maps.reshape(d, s.S, d), s.corners) + s.offsets.reshape(d, 1, s.S)
+    unit = np.concatenate(
+        [np.zeros((d, 1)), np.eye(d)[:, : d - 1]], axis=1
+    )  # one column per corner, the last row heights
+    assert np.abs(at - unit[:, :, None]).max() < 1e-10
+
+
+@every_space
+def test_heights_are_distances_from_the_plane(space):
+    s, x = soup(space, 1), np.random.default_rng(2).random((space.d, 100))
+    heights = (s.maps @ x + s.offsets)[-s.S :]
+    expected = np.einsum("ds,dsn->sn", s.normals, x[:, None] - s.corners[0][:, :, None])
+    assert np.abs(heights - expected).max() < 1e-12
+
+
+def test_facets_are_larger_by_edge():
+    s = scene(SPACES["plane"], [MATTE], [Facet(((0, 0), (2, 0)), 0, (1.0,))])
+    assert s.offsets[0, 0] == pytest.approx(EDGE, rel=1e-9)
+
+
+@every_space
+def test_a_size_is_the_gram_determinant_s_root_over_a_factorial(space):
+    """pdf_area of the one light is 1 / size."""
+    s = soup(space, 3)
+    edges = s.corners[1:, :, 0] - s.corners[0, :, 0]
+    size = np.sqrt(np.linalg.det(edges @ edges.T)) / factorial(space.d - 1)
+    assert s.lights.pdf_area == pytest.approx([1 / size])
+    assert s.pdf_area[0] == s.lights.pdf_area[0]
+    assert (s.pdf_area[1:] == 0).all()
+
+
+@every_space
+@pytest.mark.parametrize("k", [1e-3, 1e3])
+def test_a_scene_moved_and_scaled_has_the_same_normals_and_lights(space, k):
+    right = [replace(facet, emission=(1.0,)) for facet in walls(space.d)]
+    moved = [replace(facet, corners=(k * np.array(facet.corners) + 7 * k).tolist()) for facet in right]
+    a, b = scene(space, [MATTE], right), scene(space, [MATTE], moved)
+    assert np.allclose(a.normals, b.normals, atol=1e-12)
+    assert np.allclose(a.lights.upto, b.lights.upto)
+    assert np.allclose(a.pdf_area, b.pdf_area * k ** (space.d - 1))
+
+
+# ---------------------------------------------------------------- mistakes of users
+
+LIGHT = Facet(((0, 0), (1, 0)), 0, (1.0,))
+PLAIN = Facet(((0, 1), (1, 1)))
+BLUE = Material([Layer("lambert", (0.1, 0.2, 0.3))])
+BAD = {
+    "the scene has no light": ([PLAIN], []),
+    "give at least one facet a positive emission": ([replace(LIGHT, emission=(0.0,))], []),
+    "facet 1 is degenerate: its corners are [[0.5, 0.5], [0.5, 0.5]]": ([LIGHT, Facet(((0.5, 0.5), (0.5, 0.5)))], []),
+    "there is no material 1: the scene has 1": ([LIGHT, replace(PLAIN, material=1)], []),
+    "there is no material -1": ([LIGHT, replace(PLAIN, material=-1)], []),
+    "there is no material 2": ([LIGHT], [Ball((0, 0), 1.0, 2)]),
+    "emission must be 1 finite numbers >= 0, or () for none, but is (-1.0,)": (
+        [LIGHT, replace(PLAIN, emission=(-1.0,))],
+        [],
+    ),
+    "but is (nan,)": ([LIGHT, replace(PLAIN, emission=(np.nan,))], []),
+    "but is (inf,)": ([LIGHT, replace(PLAIN, emission=(np.inf,))], []),
+    "but is (0.0, 0.0)": ([LIGHT, replace(PLAIN, emission=(0.0, 0.0))], []),
+    "the lights have [1, 3] channels": ([LIGHT, replace(PLAIN, emission=(1.0, 1.0, 1.0))], []),
+    "a facet needs 2 corners of 2 finite coordinates each": ([LIGHT, Facet(((0, 0), (1, 0), (1, 1)))], []),
+    "needs 2 corners of 2 finite": ([LIGHT, Facet(((0, 0, 0), (1, 0, 0)))], []),
+    "2 corners of 2": ([LIGHT, Facet(((0, 0), (1, np.nan)))], []),
+    "of 2 finite coordinates each": ([LIGHT, Facet(((0, 0), (1, np.inf)))], []),
+    "radius=0": ([LIGHT], [Ball((0, 0), 0)]),
+    "radius=-1": ([LIGHT], [Ball((0, 0), -1)]),
+    "radius=nan": ([LIGHT], [Ball((0, 0), np.nan)]),
+    "radius=inf": ([LIGHT], [Ball((0, 0), np.inf)]),
+    "needs a centre of 2 finite coordinates": ([LIGHT], [Ball((0, 0, 0), 1)]),
+    "a positive, finite radius": ([LIGHT], [Ball((0, np.nan), 1)]),
+}
+
+
+@pytest.mark.parametrize("said", BAD)
+def test_a_scene_that_cannot_be_is_refused_with_its_value(said):
+    with pytest.raises(ValueError) as error:  # noqa: PT011
+        scene(SPACES["plane"], [MATTE], *BAD[said])
+    assert said in str(error.value)
+
+
+def test_the_light_s_channels_and_the_colours_must_agree():
+    with pytest.raises(ValueError, match="per channel of the lights' emission, here 1"):
+        scene(SPACES["plane"], [BLUE], [LIGHT])
+
+
+def test_a_sliver_is_refused_at_any_scale():
+    space = SPACES["solid"]
+    for k in (1e-6, 1.0, 1e6):
+        sliver, triangle = (
+            k * np.array([[0, 0, 0], [1, 0, 0], [2, 1e-12, 0]]),
+            k * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]),
+        )
+        assert scene(space, [MATTE], [Facet(triangle.tolist(), 0, (1.0,))]).S == 1
+        with pytest.raises(ValueError, match="facet 0 is degenerate"):
+            scene(space, [MATTE], [Facet(sliver.tolist(), 0, (1.0,))])
