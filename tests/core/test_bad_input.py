@@ -19,6 +19,8 @@ from restir_ref.restir import initial, resample, reuse_all, spatial, temporal
 from tests.core.stubs import Wrapped, live
 from toy1d import two_pixels
 
+pytestmark = pytest.mark.kernel
+
 TOY, INDEX = two_pixels(), np.arange(4)
 HERE, RIGHT = Pixels(TOY, INDEX), offset(TOY, INDEX, 1)
 X = initial(HERE, live())

@@ -23,6 +23,7 @@ every_cap = pytest.mark.parametrize("cap", [0.5, 1, 5, 20, np.inf])
 # ---------------------------------------------------------------- they add up
 
 
+@pytest.mark.kernel
 @every_weight
 @every_cap
 def test_confidences_add_up_after_the_cap_on_each_history(mis, cap):
@@ -55,6 +56,7 @@ def unlucky(X, here):
     return null_confidence_zero(replace(X, W=np.where(X.x < 0.5, 0, X.W)), here)
 
 
+@pytest.mark.kernel
 def test_confidence_does_not_depend_on_sample_values():
     assert (confidence_after_two_frames(1, keep) == confidence_after_two_frames(2, keep)).all()
 
@@ -93,6 +95,7 @@ def test_without_saturation_uncapped_frames_overflow(monkeypatch):
         uncapped(20, c=2.0**1010)
 
 
+@pytest.mark.kernel
 def test_saturated_confidences_stay_where_they_are():
     assert (uncapped(3, c=LARGEST_CONFIDENCE).c == LARGEST_CONFIDENCE).all()
 
@@ -113,6 +116,7 @@ def share_of_history(mis, cap):
     return w[1] / w.sum(axis=0)
 
 
+@pytest.mark.kernel
 @pytest.mark.claims("GRIS-A04")
 @every_weight
 @pytest.mark.parametrize("cap", [0.5, 1, 5, 20, 999])
@@ -123,11 +127,13 @@ def test_a_capped_history_weighs_at_most_M_c_over_M_c_plus_one(mis, cap):
         assert share == pytest.approx(cap / (cap + 1), rel=1e-12)
 
 
+@pytest.mark.kernel
 @every_weight
 def test_an_uncapped_history_weighs_more(mis):
     assert (share_of_history(mis, np.inf) > 20 / 21).all()
 
 
+@pytest.mark.kernel
 @every_cap
 def test_the_cap_lowers_confidences_and_nothing_else(cap):
     X = Reservoirs(np.arange(4.0), np.ones(4), np.array([0.25, 1, 7, 1e9]))

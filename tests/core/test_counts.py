@@ -12,6 +12,8 @@ from restir_ref.restir import initial, reuse_all, spatial
 from tests.core.stubs import live
 from toy1d import overlapping_supports
 
+pytestmark = pytest.mark.kernel
+
 COLUMNS = 14
 SHIFTS = {
     "talbot": lambda M: M * (M - 1),

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from restir_ref.mis import ALL_CANONICAL, ANY, WEIGHTS, constant
 from tests.core.inputs import Inputs, drawn, exactly, fractions, inputs, mixed, weights
 
+pytestmark = pytest.mark.kernel
+
 every_weight = pytest.mark.parametrize("name", WEIGHTS)
 every_formula = pytest.mark.parametrize(
     "m", [m for w in WEIGHTS.values() for m in (w.m, w.c) if m is not None], ids=lambda m: m.__name__

@@ -14,6 +14,8 @@ from restir_ref.restir import initial, reuse_all, shade, spatial, temporal
 from tests.core.stubs import Wrapped, live, same_bits
 from toy1d import overlapping_supports
 
+pytestmark = pytest.mark.kernel
+
 every_weight = pytest.mark.parametrize("mis", WEIGHTS.values(), ids=WEIGHTS)
 
 

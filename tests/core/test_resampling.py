@@ -14,6 +14,8 @@ from restir_ref.restir import initial, resample, shade, spatial
 from tests.core.stubs import Always, Wrapped, live, same_bits
 from toy1d import Line, two_pixels
 
+pytestmark = pytest.mark.kernel
+
 N = 600
 every_weight = pytest.mark.parametrize("mis", WEIGHTS.values(), ids=WEIGHTS)
 
