@@ -92,7 +92,7 @@ def _coordinates(s: Scene, x: Array) -> Array:
 def _ball_nearness(s: Scene, x: Array, w: Array) -> Array:
     """1 / t of the first crossing with each ball, 0 if it is missed; (B, n).
 
-    |x - c + t w|^2 = r^2 has the roots |w|^2 / t' ... of  near = |w|^2 / (along +- sqrt(along^2 + |w|^2 depth)).
+    |x + t w - c|^2 = r^2 at t |w|^2 = along +- sqrt(along^2 + |w|^2 depth), with along = (c - x).w.
     """
     to, depth = _depth(s, x)
     along, w2 = dot(to, w), dot(w, w)

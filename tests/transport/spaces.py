@@ -10,12 +10,12 @@ from restir_ref.batch import Array
 
 @dataclass(frozen=True)
 class Solid:
-    """d = 3: concentric disk, triangles, and visible normals of the hemisphere [Heitz 2018]."""
+    """d = 3: concentric disk, triangles, and visible normals of the hemisphere (Heitz 2018)."""
 
     d: int = 3
 
     def to_local(self, n: Array, w: Array) -> Array:
-        """Components in the frame of [Duff 2017]."""
+        """Components in Duff's frame (2017)."""
         s, t = self._tangents(n)
         return np.stack([(s * w).sum(axis=0), (t * w).sum(axis=0), (n * w).sum(axis=0)])
 

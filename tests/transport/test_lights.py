@@ -22,7 +22,7 @@ def lamp(space: Space) -> tuple[Scene, Array]:
 
 
 def subtended(corners: Array) -> float:
-    """Angle of a segment, or solid angle of a triangle, seen from the origin.  [Van Oosterom 1983]"""
+    """Angle of a segment, or solid angle of a triangle, seen from the origin.  (Van Oosterom 1983)"""
     e = corners / np.linalg.norm(corners, axis=1, keepdims=True)
     if len(e) == 2:
         return float(np.arccos(e[0] @ e[1]))

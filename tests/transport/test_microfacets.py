@@ -113,7 +113,7 @@ def test_the_normals_projected_area_is_that_of_the_surface(space, alpha):
 @every_alpha
 @pytest.mark.parametrize("cos", [1.0, 0.7, 0.2, 0.02])
 def test_the_visible_normals_projected_area_is_cos_o(space, alpha, cos):
-    """G_1(o) int max(0, o.m) D(m) dm = cos_o.  [Heitz 2014]"""
+    """G_1(o) int max(0, o.m) D(m) dm = cos_o.  (Heitz 2014)"""
     s, o = plain(alpha), tilted(space.d, cos)
     seen = over_normals(space, lambda m: ggx_D(space, s.alpha, m) * facing(spread(o, m), m))
     assert G1(alpha, cos) * seen == pytest.approx(cos, abs=ERROR[space.d])
