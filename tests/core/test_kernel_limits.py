@@ -112,7 +112,7 @@ def offered(*mW):
 @every_selector
 def test_a_confidence_that_all_columns_share_becomes_one_number_per_column(selector):
     for c in (np.array(3), np.array([3]), np.full(N, 3)):
-        chosen = selector(offered(1.0, 2.0), live(), c)
+        chosen = selector(offered(1.0, 4.0), live(), c)
         assert chosen.c.shape == chosen.W.shape == (N,)
         assert (chosen.c == 3).all()
 
