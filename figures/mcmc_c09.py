@@ -167,7 +167,7 @@ def check(a: Arrays) -> list[Claim]:
 
     def larger(caps: Array, without: Array, mutated: Array) -> tuple[criteria.Outcome, str]:
         best, other = (int(caps[error.argmin()]) for error in (without, mutated))
-        return criteria.between(other / best, 1, np.inf), f"best M_c with 5 mutations ({other}) / without ({best})"
+        return criteria.above(other / best, 1), f"best M_c with 5 mutations ({other}) / without ({best})"
 
     real, exact = larger(a["caps"], none.mean(axis=-1), five.mean(axis=-1)), larger(a["ring_caps"], still, moved)
     return [

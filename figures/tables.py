@@ -1,12 +1,13 @@
 """What the commands print: rows as plain data for JSON, and the same rows as aligned tables."""
 
 import textwrap
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from figures.criteria import show
-from figures.figure import Verdict
+from figures.figure import VERDICTS, Verdict
 from figures.gather import gather
 from figures.ledger import Row
 from figures.registry import Entry
@@ -70,19 +71,26 @@ def _coverage(row: Mapping[str, Any]) -> list[str]:
 
 
 def summary(judged: Sequence[Judged], crashed: Sequence[str]) -> str:
-    """The verdicts after a run, and the figures that crashed."""
-    heads = ("claim", "figure", "measured", "criterion", "verdict", "expected")
+    """The verdicts after a run, the figures that crashed, and how many claims came out how."""
+    heads = ("claim", "figure", "measured", "criterion", "verdict", "what was measured")
     table = aligned(heads, [row for claim in judged for row in _rows(claim)])
-    return "\n".join([table, *(f"{id_} crashed: its traceback is in the report" for id_ in crashed)])
+    return "\n".join([table, *(f"{id_} crashed: its traceback is in the report" for id_ in crashed), counts(judged)])
+
+
+def counts(judged: Sequence[Judged]) -> str:
+    """How many claims have which verdict, and how many of them are not the expected one."""
+    found = Counter[str](claim.verdict or "not measured" for claim in judged)
+    by_verdict = [f"{found[name]} {name}" for name in (*VERDICTS, "not measured") if found[name]]
+    differing = sum(claim.agrees is False for claim in judged)
+    return f"{len(judged)} claims: {', '.join(by_verdict)}; {differing} not as expected"
 
 
 def _rows(claim: Judged) -> Iterator[list[str]]:
-    expected = (claim.expected or "-") + (" DIFFERS" if claim.agrees is False else "")
-    if not claim.checks:
-        yield [claim.id, ", ".join(claim.figures), "-", "-", "not measured", expected]
+    """The claim with its verdict and, where it is not the expected one, that; then its checks."""
+    verdict = (claim.verdict or "not measured") + (f" DIFFERS from {claim.expected}" if claim.agrees is False else "")
+    yield [claim.id, ", ".join(claim.figures), "", "", verdict, ""]
     for figure, check in claim.checks:
-        measured = f"{check.part} {show(check.measured)}".strip()
-        yield [claim.id, figure, measured, check.criterion, check.verdict, expected]
+        yield ["", figure, show(check.measured), check.criterion, check.verdict, check.part]
 
 
 def crashes(out: Path) -> list[str]:

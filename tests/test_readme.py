@@ -15,5 +15,13 @@ def test_the_readme_examples_run_and_find_the_planted_bug(capsys) -> None:
     assert "BIASED: -50.00%" in printed
 
 
-def test_the_readme_examples_have_at_most_20_lines_of_code() -> None:
-    assert len([line for block in EXAMPLES for line in block.splitlines() if line.strip()]) <= 20
+def test_the_readme_examples_are_short() -> None:
+    """20 lines in all, imports said once; the one that finds the bug under 15."""
+    first, second = ([line for line in block.splitlines() if line.strip()] for block in EXAMPLES)
+    assert len(second) < 15
+    assert len([*first, *(line for line in second if line not in first)]) <= 20
+
+
+def test_each_readme_example_runs_by_itself() -> None:
+    for block in EXAMPLES:
+        exec(compile(block, "README.md", "exec"), {})
