@@ -143,14 +143,16 @@ def draw(a: Arrays) -> "Picture":
     line, x = overlapping_supports(), np.linspace(0.15, 1.05, 600)
     for i in range(line.n):
         y = line.target(np.full(600, i), x)
-        centre = {"color": "#000000", "lw": 2.2, "ls": "-", "label": "centre", "zorder": 3}
-        toy.plot(
-            x, np.where(y > 0, y, np.nan), marker="", **(centre if i == CENTRE else {"color": "#888888", "lw": 0.9})
-        )
+        look = {"color": "#000000", "lw": 2.2, "ls": "-", "label": "centre", "zorder": 3}
+        other = {"color": "#888888", "lw": 0.9, "label": "others, cut off by their domains" if i == 0 else None}
+        toy.plot(x, np.where(y > 0, y, np.nan), marker="", **(look if i == CENTRE else other))
     toy.set(
-        xlabel="$x$ (length)", ylabel="integrand (per unit length)", title="Seven pixels, partly overlapping domains"
+        xlabel="$x$ (length)",
+        ylabel="integrand (per unit length)",
+        title="Seven pixels, partly overlapping domains",
+        ylim=(0.05, 1.45),
     )
-    toy.legend()
+    toy.legend(loc="upper left")
     for k, mis in enumerate(NAMES):
         (curve,) = curves.loglog(a["n"], a["variance"][k], marker="", label=LABELS[mis])
         look = {"ls": "", "marker": style.MARKERS[k], "color": curve.get_color(), "markevery": 1}

@@ -191,7 +191,7 @@ def draw(a: Arrays) -> "Picture":
         xscale="log",
         xlabel="largest $w_i$ over its bound $c_i C_i / C_R$",
         ylabel="fraction of configurations",
-        title="Theorem A.4: 1 is never exceeded",
+        title="Theorem A.4: only 1/M exceeds 1",
     )
     weight.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
     return picture
