@@ -2,7 +2,7 @@
 
 `HYPOTHESIS_PROFILE` chooses the profile: `dev` for new examples at the keyboard, `ci` for the same
 examples every time (`make test`, and wherever CI is set), `nightly` for many, `kernel` for so few that
-`pytest -m kernel` takes five seconds.
+all laws marked `kernel` take five seconds.
 """
 
 import os
