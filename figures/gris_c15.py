@@ -89,26 +89,27 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
 
 
 def check(a: Arrays) -> list[Claim]:
-    """Unbiased always; never worse than the worse map if the maps share the sample's confidence."""
+    """Unbiased always; the variance bound, with each shift counted fully and with the confidence shared."""
     shared, full = a["over"]
-    exceeds = dict(zip(ROBUST, (full > 1 + 1e-9).mean(axis=-1), strict=True))
-    caveat = (
-        "Read plainly the bound fails; it holds only with pairwise weights, and with the sample's confidence shared "
-        "between its shifts, a variant judged after the plain one was seen to fail. Counted fully, one "
-        "sample weighs as two, and the variance exceeds that of the worse shift in "
-        + ", ".join(f"{fraction:.0%} ({mis})" for mis, fraction in exceeds.items())
-        + f" of the random scenes; for Talbot weights in {(shared[0] > 1 + 1e-9).mean():.0%} even when shared"
+    exceeds = ", ".join(
+        f"{fraction:.0%} ({mis})" for mis, fraction in zip(ROBUST, (full > 1 + 1e-9).mean(axis=-1), strict=True)
     )
+    why = (
+        "Both shifts together are unbiased, which is all the paper says; the variance clause is the ledger's. Counted "
+        f"fully, one sample weighs as two, and the variance exceeds that of the worse shift in {exceeds} of the scenes"
+    )
+    parts = [("counted fully", mis, full[ROBUST.index(mis)]) for mis in ROBUST]
+    parts += [("confidence shared", mis, shared[ROBUST.index(mis)]) for mis in LINEAR]
     return [
         Claim("GRIS-C15", criteria.below(a["bias"], 1e-10), "largest exact bias of a cell"),
         *(
             Claim(
                 "GRIS-C15",
-                criteria.between(shared[ROBUST.index(mis)].max(), 0, 1 + 1e-9),
-                f"{mis}: largest variance over the larger single-shift one",
-                caveat=caveat,
+                criteria.between(over.max(), 0, 1 + 1e-9),
+                f"{mis}, {way}: largest variance over the larger single-shift one",
+                reason=why,
             )
-            for mis in LINEAR
+            for way, mis, over in parts
         ),
     ]
 
