@@ -12,7 +12,6 @@ import numpy as np
 
 from restir_ref.batch import Array
 from restir_ref.transport.lobes import LOBES
-from restir_ref.transport.rays import intersect, visible
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import norm
 
@@ -83,7 +82,7 @@ def seen_share(scene: Scene, p: Panels, i: Array, j: Array) -> Array:
     """How much of panel j panel i sees: the mean over four pairs of their quarter points, (Q,)."""
     quarters = [(s, t) for s in (0.25, 0.75) for t in (0.25, 0.75)]
     pairs = [(p.a[:, i] * (1 - s) + p.b[:, i] * s, p.a[:, j] * (1 - t) + p.b[:, j] * t) for s, t in quarters]
-    return np.asarray(np.mean([visible(scene, x, y) for x, y in pairs], axis=0))
+    return np.asarray(np.mean([scene.visible(x, y) for x, y in pairs], axis=0))
 
 
 def in_front(x: Array, n: Array, y: Array) -> Array:
@@ -105,7 +104,7 @@ def gather(scene: Scene, p: Panels, B: Array, x: Array, prim: Array, n: Array) -
     out = np.zeros(x.shape[-1])
     for k in range(x.shape[-1]):
         j = np.flatnonzero(facing[k])
-        seen = visible(scene, np.repeat(x[:, k : k + 1], len(j), axis=1), p.middle[:, j])
+        seen = scene.visible(np.repeat(x[:, k : k + 1], len(j), axis=1), p.middle[:, j])
         share = np.abs(_sine(p.b[:, j], x[:, k], n[:, k]) - _sine(p.a[:, j], x[:, k], n[:, k])) / 2
         out[k] = (share * B[j] * seen).sum()
     return out * _albedo(scene, prim)
@@ -129,7 +128,7 @@ def render(scene: Scene, sensor: object, bounces: int, per_segment: int = 60, fi
     n = sensor.n  # type: ignore[attr-defined]
     u = np.tile((np.arange(film) + 0.5) / film, n)[None]
     x, w, _ = sensor.ray(np.repeat(np.arange(n), film), u)  # type: ignore[attr-defined]
-    t, prim = intersect(scene, x, w)
+    t, prim = scene.intersect(x, w)
     normal = scene.normals.take(prim, axis=-1)
     facing = np.where((normal * w).sum(axis=0) < 0, normal, -normal)
     front = (normal * w).sum(axis=0) < 0

@@ -17,7 +17,7 @@ import numpy as np
 from restir_ref.batch import Array, ratio
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
-from restir_ref.transport.rays import arrive, emitted, light_pdf, sample_light, visible
+from restir_ref.transport.rays import arrive, emitted, light_pdf, sample_light
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import norm
 
@@ -164,7 +164,7 @@ def light_leaf(t: Tracer, v: Vertex, P: Array, u: Array, i: int) -> tuple[Leaf, 
     seen = (cos_y > 0) & (f > 0).any(axis=0)
     p_light = light.pdf_area * r ** (s.space.d - 1) / np.where(seen, cos_y, 1)
     facing = np.flatnonzero(seen)
-    seen[facing] = visible(s, v.x.take(facing, axis=-1), light.y.take(facing, axis=-1))
+    seen[facing] = s.visible(v.x.take(facing, axis=-1), light.y.take(facing, axis=-1))
     bare = np.where(seen, light.emission / p_light, 0)
     return Leaf(f * bare * ratio(p_light, p_light + p_all), bare, p_light), w
 

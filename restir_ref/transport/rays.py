@@ -1,36 +1,16 @@
-"""Rays in a scene: what they meet, what stands between two points, and points on lights.
+"""From points and directions to vertices: what a ray meets, and points on lights."""
 
-A simplex with corners v_0 .. v_(d-1) has an affine map to coordinates b >= 0 with sum b <= 1 and to a
-height h along its normal.  A ray x + t w crosses its plane at 1/t = -h'/h, and is inside if that times
-b, b(x)/t + b', is >= 0 and sums to at most 1/t: one division per simplex, and the maps are matrix products.
-
-Floating point: what lies within CLEARANCE of a surface is on it, and neither meets nor is hidden by
-it, at any angle.
-"""
-
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio, total
+from restir_ref.batch import Array, total
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import dot, normalize, power
 
-CLEARANCE = 1e-10
-"""Heights below this share of the scene's extent are 0."""
-
 GRAZING = 1e-12
 """Least cosine of a direction that has met a surface."""
-
-BLOCK = 2**15
-"""Simplices times rays to be treated at once: what stays in the cache."""
-
-# Hazard: glibc gives freed memory back to the system at once, and every temporary array then costs
-# page faults, 5 times the arithmetic.  Once a large array has come and gone (this one is never
-# touched) it keeps up to twice its size; other allocators do not mind.
-np.empty(3 * 2**20)
 
 
 @dataclass(frozen=True)
@@ -43,111 +23,9 @@ class LightPoint:
     pdf_area: Array
 
 
-def intersect(s: Scene, x: Array, w: Array) -> tuple[Array, Array]:
-    """Distance t (N,) to the nearest surface along x + t w, and its primitive (N,); inf and 0 if there is none."""
-    near, prim = np.empty(x.shape[-1]), np.empty(x.shape[-1], dtype=int)
-    for part in _blocks(s, x.shape[-1]):
-        near[part], prim[part] = _nearest(s, x[:, part], w[:, part])
-    with np.errstate(divide="ignore"):
-        return 1 / near, prim
-
-
-def _blocks(s: Scene, n: int) -> Iterator[slice]:
-    """Slices of the batch axis with about BLOCK / S columns."""
-    step = max(BLOCK // len(s.material), 256)
-    return (slice(at, at + step) for at in range(0, n, step))
-
-
-def _nearest(s: Scene, x: Array, w: Array) -> tuple[Array, Array]:
-    """1 / t of the nearest surface (n,), 0 if there is none, and its primitive (n,)."""
-    near = _facet_nearness(s, x, w)
-    if s.radii.size:
-        near = np.concatenate([near, _ball_nearness(s, x, w)])
-    nearest = near.max(axis=0)
-    index = np.arange(len(near), dtype=np.min_scalar_type(len(near)))[:, None]
-    prim = ((near == nearest) * index).max(axis=0)  # argmax(axis=0), but 3 times as fast
-    return nearest, prim * (nearest > 0)
-
-
-def _facet_nearness(s: Scene, x: Array, w: Array) -> Array:
-    """1 / t of the crossing with each facet, 0 if it is missed; (S, n)."""
-    *b, h = _coordinates(s, x)
-    *back, descent = (s.maps @ -w).reshape(s.space.d, s.S, -1)
-    h[np.abs(h) <= CLEARANCE * s.extent] = np.inf
-    near = np.asarray(descent / h)
-    scaled = [b_k * near - back_k for b_k, back_k in zip(b, back, strict=True)]
-    hit = (near > 0) & (total(scaled) <= near)
-    for b_k in scaled:
-        hit &= b_k >= 0
-    return near * hit
-
-
-def _coordinates(s: Scene, x: Array) -> Array:
-    """Coordinates and height of points x in all facets, (d, S, n)."""
-    at = s.maps @ x
-    at += s.offsets
-    return at.reshape(s.space.d, s.S, -1)
-
-
-def _ball_nearness(s: Scene, x: Array, w: Array) -> Array:
-    """1 / t of the first crossing with each ball, 0 if it is missed; (B, n).
-
-    |x + t w - c|^2 = r^2 at t |w|^2 = along +- sqrt(along^2 + |w|^2 depth), with along = (c - x).w.
-    """
-    to, depth = _depth(s, x)
-    along, w2 = dot(to, w), dot(w, w)
-    root2 = along**2 + w2 * depth
-    root = np.sqrt(np.maximum(root2, 0))
-    far = np.where(depth >= 0, along + root, along - root)
-    return ratio(w2, far * ((far > 0) & (root2 > 0)))
-
-
-def _depth(s: Scene, x: Array) -> tuple[Array, Array]:
-    """To the balls' centres (d, B, n), and r^2 - |x - c|^2 (B, n): positive inside, 0 on a ball."""
-    to = s.centres[:, :, None] - x[:, None]
-    depth = s.radii**2 - dot(to, to)
-    return to, depth * (np.abs(depth) > 2 * s.radii * CLEARANCE * s.extent)
-
-
-def visible(s: Scene, x: Array, y: Array) -> Array:
-    """Whether nothing stands between x and y, (N,); the same, to the last bit, as between y and x."""
-    clear = np.empty(x.shape[-1], dtype=bool)
-    for part in _blocks(s, x.shape[-1]):
-        clear[part] = ~_facets_between(s, x[:, part], y[:, part])
-        if s.radii.size:
-            clear[part] &= ~_balls_between(s, x[:, part], y[:, part])
-    return clear
-
-
-def _facets_between(s: Scene, x: Array, y: Array) -> Array:
-    """Whether heights have opposite signs and (b(x) h(y) - b(y) h(x)) / (h(y) - h(x)) is inside a facet; (n,)."""
-    (*b_x, h_x), (*b_y, h_y) = _coordinates(s, x), _coordinates(s, y)
-    least = CLEARANCE * s.extent
-    hidden = (np.minimum(h_x, h_y) < -least) & (np.maximum(h_x, h_y) > least)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scale = 1 / (h_y - h_x)
-        b = [(k_x * h_y - k_y * h_x) * scale for k_x, k_y in zip(b_x, b_y, strict=True)]
-        hidden &= total(b) <= 1
-        for b_k in b:
-            hidden &= b_k >= 0
-    return np.asarray(hidden.any(axis=0))
-
-
-def _balls_between(s: Scene, x: Array, y: Array) -> Array:
-    """Whether the segment enters or leaves a ball, other than at its ends; (n,)."""
-    (to_x, depth_x), (to_y, depth_y) = _depth(s, x), _depth(s, y)
-    to = y - x
-    along_x, along_y = dot(to_x, to), -dot(to_y, to)
-    through = (depth_x < 0) & (depth_y > 0) | (depth_x > 0) & (depth_y < 0)
-    chord2 = (depth_x + depth_y) * dot(to, to) + (along_x**2 + along_y**2)
-    outside = (np.maximum(depth_x, depth_y) <= 0) & (np.minimum(depth_x, depth_y) < 0)
-    hidden = through | outside & (along_x > 0) & (along_y > 0) & (chord2 > 0)
-    return np.asarray(hidden.any(axis=0))
-
-
 def arrive(s: Scene, x: Array, w: Array) -> tuple[Vertex, Array, Array]:
     """The vertex that the ray from x along w meets, the distance t (N,), and whether it meets any (N,)."""
-    t, prim = intersect(s, x, w)
+    t, prim = s.intersect(x, w)
     met = np.isfinite(t)
     t = np.where(met, t, s.extent)
     return vertex(s, x + t * w, prim, -w), t, met

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from restir_ref.batch import Array
+from restir_ref.transport import intersection
 from restir_ref.transport.materials import Material, Table, table
 from restir_ref.transport.space import Space
 
@@ -77,6 +78,14 @@ class Scene:
     def S(self) -> int:
         """Number of facets."""
         return int(self.normals.shape[-1])
+
+    def intersect(self, x: Array, w: Array) -> tuple[Array, Array]:
+        """Distance t (N,) to the nearest surface along x + t w, and its primitive (N,); inf and 0 if there is none."""
+        return intersection.intersect(self, x, w)
+
+    def visible(self, x: Array, y: Array) -> Array:
+        """Whether nothing stands between x and y, (N,)."""
+        return intersection.visible(self, x, y)
 
 
 def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], balls: Sequence[Ball] = ()) -> Scene:

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from restir_ref.batch import Array
-from restir_ref.transport import rays
+from restir_ref.transport import intersection
 from restir_ref.transport import scene as scenes
-from restir_ref.transport.rays import CLEARANCE, arrive, intersect, normal, vertex, visible
+from restir_ref.transport.intersection import CLEARANCE, intersect, visible
+from restir_ref.transport.rays import arrive, normal, vertex
 from restir_ref.transport.scene import Ball, Facet, scene
 from restir_ref.transport.space import Space
 from tests.transport.rooms import MATTE, crossings, directions, inside, room, simplex, soup
@@ -46,7 +47,7 @@ def test_rays_meet_what_linear_systems_say(space):
 def test_blocks_of_rays_are_a_matter_of_speed_only(space, monkeypatch):
     s, x, w = soup(space, 1), somewhere(space.d, 3000, 2), directions(space.d, 3000, 3)
     whole = (*intersect(s, x, w), visible(s, x, w))
-    monkeypatch.setattr(rays, "BLOCK", 1)
+    monkeypatch.setattr(intersection, "BLOCK", 1)
     assert all((a == b).all() for a, b in zip(whole, (*intersect(s, x, w), visible(s, x, w)), strict=True))
 
 
