@@ -18,22 +18,26 @@ from restir_ref.transport.scene import Ball, Facet, Scene, scene
 
 Point = tuple[float, float]
 
+INSET = 128
+"""Pixels of the standard inset."""
+
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """A scene with the place to look from: the papers' way to show it."""
+    """A scene with the place to look from, and the inset that shows why it matters: `crop`, its first film pixel."""
 
     scene: Scene
     eye: Point
     towards: Point
     depth: int = 3
+    crop: int = 896
     half: float = 0.6
     low: Point = (0.0, 0.0)
     high: Point = (1.0, 1.0)
 
-    def pinhole(self, n: int, first: int = 896) -> Pinhole:
-        """n pixels of the virtual film, from pixel `first` on."""
-        return Pinhole(self.eye, self.towards, n, self.half, first)
+    def pinhole(self, n: int = INSET, first: int | None = None) -> Pinhole:
+        """n pixels of the virtual film, from pixel `first` on; the scene's inset unless told otherwise."""
+        return Pinhole(self.eye, self.towards, n, self.half, self.crop if first is None else first)
 
     def fluence(self, columns: int, rows: int) -> FluenceMap:
         """A map of the whole scene."""
@@ -74,12 +78,15 @@ def boxes(material: int) -> list[Facet]:
 
 LAMP: list[Point] = [(0.65, 0.995), (0.35, 0.995)]
 CORNELL_VIEW = ((0.5, 0.7), (0.45, 0.2))
+BOX_EDGE = 960
+"""The inset with the floor and a side of the left box."""
 
 
 def cornell(roughness: float = 0.5) -> Setting:
     """FS1: a square room, a light below the ceiling, two boxes; Lambert and GGX mixed, no extreme."""
     materials = [mixed(0.5, 0.5, 0.2), mixed(0.3, roughness, 0.5)]
-    return Setting(scene(PLANE, materials, [*room(0), *boxes(1), *chain(LAMP, 0, 8.0)]), *CORNELL_VIEW)
+    facets = [*room(0), *boxes(1), *chain(LAMP, 0, 8.0)]
+    return Setting(scene(PLANE, materials, facets), *CORNELL_VIEW, crop=BOX_EDGE)
 
 
 def glossy_cornell() -> Setting:
@@ -90,7 +97,7 @@ def glossy_cornell() -> Setting:
 def matte_cornell() -> Setting:
     """FS1 and FS2 all Lambert, for which radiosity is a reference."""
     facets = [*room(0), *boxes(1), *chain(LAMP, 0, 8.0)]
-    return Setting(scene(PLANE, [matte(0.6), matte(0.7)], facets), *CORNELL_VIEW)
+    return Setting(scene(PLANE, [matte(0.6), matte(0.7)], facets), *CORNELL_VIEW, crop=BOX_EDGE)
 
 
 def ajar(gap: float = 0.06) -> Setting:
@@ -109,7 +116,7 @@ def crease() -> Setting:
     """FS4: a wedge of 40 degrees and a gap below furniture: short reconnections, the geometry term's singularity."""
     slope = [(0.0, 0.0), (0.45, 0.45 * float(np.tan(np.radians(40))))]
     facets = [*room(0), *chain(slope, 0), *block((0.6, 0.03), (0.9, 0.3), 0), *chain(LAMP, 0, 8.0)]
-    return Setting(scene(PLANE, [matte(0.7)], facets), (0.55, 0.6), (0.45, 0.0))
+    return Setting(scene(PLANE, [matte(0.7)], facets), (0.55, 0.6), (0.45, 0.0), crop=512)
 
 
 def occluders() -> Setting:
@@ -120,6 +127,7 @@ def occluders() -> Setting:
         scene(PLANE, [matte(0.6), matte(0.4)], [*room(0), *joined.from_iterable(posts), *light]),
         (0.03, 0.5),
         (1.0, 0.5),
+        crop=384,
     )
 
 
@@ -140,6 +148,7 @@ def rack() -> Setting:
         scene(PLANE, [matte(0.5), matte(0.7)], [*room(0), *joined.from_iterable(bars), *lights]),
         (0.5, 0.95),
         (0.5, 0.0),
+        crop=960,
     )
 
 
@@ -148,13 +157,13 @@ def glass_disc() -> Setting:
     glass = Material([Layer("glass reflection", (1.0,), 0.0), Layer("glass transmission", (1.0,), 0.0)], eta=1.5)
     facets = [*room(0), *chain([(0.56, 0.99), (0.44, 0.99)], 0, 20.0)]
     balls = [Ball((0.5, 0.25), 0.14, 1)]
-    return Setting(scene(PLANE, [matte(0.6), glass], facets, balls), (0.12, 0.45), (0.6, 0.0), depth=5)
+    return Setting(scene(PLANE, [matte(0.6), glass], facets, balls), (0.12, 0.45), (0.6, 0.0), depth=5, crop=1072)
 
 
 def distant_caustic() -> Setting:
-    """FS9: a small glossy segment mirrors a small distant window onto the wall."""
+    """FS9: a small glossy segment mirrors a small distant window onto the middle of the view."""
     shiny = Material([Layer("ggx", (0.95,), 0.12)])
-    mirror = chain([(0.62, 0.10), (0.50, 0.06)], 1)
+    mirror = chain([(0.62, 0.0734), (0.50, 0.0866)], 1)
     window = chain([(1.995, 0.60), (1.995, 0.66)], 0, 80.0)
     return Setting(
         scene(PLANE, [matte(0.5), shiny], [*room(0, 2.0), *mirror, *window]), (0.7, 0.6), (0.0, 0.45), high=(2.0, 1.0)
@@ -166,7 +175,7 @@ def clear_coat() -> Setting:
     coated = Material([Layer("lambert", (0.5,), weight=0.6), Layer("ggx", (0.3,), 0.1, weight=0.4)])
     floor, walls = chain([(0, 0), (1, 0)], 1), chain([(1, 0), (1, 1), (0, 1), (0, 0)], 0)
     facets = [*floor, *walls, *block((0.6, 0.15), (0.8, 0.45), 0), *chain(LAMP, 0, 8.0)]
-    return Setting(scene(PLANE, [matte(0.6), coated], facets), (0.2, 0.7), (0.55, 0.0))
+    return Setting(scene(PLANE, [matte(0.6), coated], facets), (0.2, 0.7), (0.55, 0.0), crop=1216)
 
 
 FURNACE_ALBEDO = 0.5
@@ -183,7 +192,7 @@ def many_lights() -> Setting:
     lamps = [chain([((i + 0.6) / 64, 0.99), ((i + 0.4) / 64, 0.99)], 0, float(p)) for i, p in enumerate(power)]
     slats = [chain([(x, 0.8), (x + 0.05, 0.8)], 1) for x in np.linspace(0.05, 0.9, 9)]
     facets = [*room(0), *joined.from_iterable(lamps), *joined.from_iterable(slats), *block((0.4, 0.001), (0.6, 0.2), 1)]
-    return Setting(scene(PLANE, [matte(0.5), matte(0.3)], facets), (0.5, 0.6), (0.3, 0.0))
+    return Setting(scene(PLANE, [matte(0.5), matte(0.3)], facets), (0.5, 0.6), (0.3, 0.0), crop=768)
 
 
 SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
