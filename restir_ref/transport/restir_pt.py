@@ -49,3 +49,17 @@ class PathIntegrals:
         there: PathIntegrals = to.of  # type: ignore[assignment]
         y, J = shift_path(there.tracer, x, to.index % there.n)
         return Shifted(y, J)
+
+
+@dataclass(frozen=True, eq=False)
+class ReconnectionAtX2(PathIntegrals):
+    """The reconnection shift taken literally: y_1 joins x_2 or nothing does, for the rule RECONNECTION.  [GRIS 7.2]
+
+    Where x_1 or x_2 is a mirror or glass the shift is undefined; `RECONNECTION` alone replays such
+    vertices and reconnects behind them.
+    """
+
+    def shift(self, x: Path, index: Array, to: Pixels) -> Shifted:
+        """Undefined unless x_2 is the reconnection vertex, a light point sampled from x_1, or not there at all."""
+        y = super().shift(x, index, to)
+        return Shifted(y.x, np.where((x.c == 2) | (x.k == 0) | ((x.k == 1) & x.nee), y.J, 0.0))

@@ -1,0 +1,134 @@
+"""Renderings of flatland as figures compare them: at equal rays, against references that are not ReSTIR.
+
+A *renderer* makes one independent estimate of the image per replica; a *film* is a chain of frames
+with history.  Rays are counted by the scene, so costs do not depend on the machine.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from flatland2d import SCENES
+from flatland2d.sensors import Pinhole
+from restir_ref.batch import Array
+from restir_ref.chance import Chance
+from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.loop import OFFLINE, REAL_TIME, Preset, frame, random_in_row, spread_in_row
+from restir_ref.restir import shade
+from restir_ref.transport.counting import counted, rays
+from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer, radiance, trace
+from restir_ref.transport.restir_pt import PathIntegrals
+
+HYBRID = Connectability(0.2, 0.02)
+"""Roughness .2 and 2% of the scene's size.  [GRIS 8.3]"""
+
+RULES: Mapping[str, Connectability] = MappingProxyType({"reconnection": RECONNECTION, "hybrid": HYBRID})
+
+COLUMNS = 2**14
+"""Columns rendered at once: what fits the cache."""
+
+Renderer = Callable[[PathIntegrals, Array, Chance], Array]
+"""(image, columns, chance) -> one estimate per column, grey, (N,)."""
+
+Sources = Callable[[PathIntegrals, PathIntegrals], Array]
+"""Motion vectors: (this frame, the previous one) -> the previous frame's pixel of every pixel, (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """Independent images (R, n) and what they cost: rays per pixel and image."""
+
+    images: Array
+    rays: float
+
+
+def view(
+    scene: str,
+    rule: Connectability,
+    asked: Counter[str],
+    sensor: Pinhole | None = None,
+    integrals: Callable[[Tracer], PathIntegrals] = PathIntegrals,
+) -> PathIntegrals:
+    """The scene's standard inset, or another view of it, which counts its rays."""
+    setting = SCENES[scene]()
+    return integrals(Tracer(counted(setting.scene, asked), sensor or setting.pinhole(), setting.depth, rule))
+
+
+def path_tracing(samples: int) -> Renderer:
+    """The mean of so many path trees, all their leaves."""
+
+    def render(of: PathIntegrals, index: Array, chance: Chance) -> Array:
+        total = np.zeros(len(index))
+        for _ in range(samples):
+            total += radiance(trace(of.tracer, chance.uniform((of.tracer.D, len(index))), index % of.n)).mean(axis=0)
+        return total / samples
+
+    return render
+
+
+def spatial_only(preset: Preset) -> Renderer:
+    """One frame of a preset without history, its neighbours from a low-discrepancy sequence."""
+
+    def render(of: PathIntegrals, index: Array, chance: Chance) -> Array:
+        here = Pixels(of, index)
+        return np.asarray(shade(frame(here, chance, preset, spread_in_row), here).mean(axis=0))
+
+    return render
+
+
+offline = spatial_only(OFFLINE)
+
+
+def estimates(render: Renderer, of: PathIntegrals, asked: Counter[str], count: int, chance: Chance) -> Estimates:
+    """`count` independent images and their cost, rendered in blocks."""
+    before, at_once = rays(asked), max(1, COLUMNS // of.n)
+    parts = [min(at_once, count - start) for start in range(0, count, at_once)]
+    images = [render(of, np.arange(part * of.n), chance).reshape(part, of.n) for part in parts]
+    return Estimates(np.concatenate(images), (rays(asked) - before) / (count * of.n))
+
+
+def means(images: Array, T: int) -> Array:
+    """Means of groups of T independent images, (R // T, n)."""
+    groups = len(images) // T
+    return np.asarray(images[: groups * T].reshape(groups, T, -1).mean(axis=1))
+
+
+def film(
+    views: Sequence[PathIntegrals],
+    replicas: int,
+    chance: Chance,
+    preset: Preset = REAL_TIME,
+    sources: Sources | None = None,
+) -> Iterator[Array]:
+    """Frames of a preset with history, one per view, (replicas, n) each; still views need no `sources`."""
+    history: Reservoirs | None = None
+    before: list[Pixels] = []
+    for k, of in enumerate(views):
+        index = np.arange(replicas * of.n)
+        if k:
+            there = index % of.n if sources is None else sources(of, views[k - 1])[index % of.n]
+            before = [Pixels(views[k - 1], index - index % of.n + there)]
+        here = Pixels(of, index)
+        history = frame(here, chance, preset, random_in_row, history, before)
+        yield np.asarray(shade(history, here).mean(axis=0).reshape(replicas, of.n))
+
+
+def moving(scene: str, frames: int, step: float) -> list[Pinhole]:
+    """A camera that moves sideways by `step` per frame and arrives at the standard inset with the last one."""
+    last = SCENES[scene]().pinhole()
+    forward = np.subtract(last.towards, last.eye) / np.linalg.norm(np.subtract(last.towards, last.eye))
+    side = step * np.array([forward[1], -forward[0]])
+    return [_moved(last, (k - frames + 1) * side) for k in range(frames)]
+
+
+def _moved(view: Pinhole, by: Array) -> Pinhole:
+    eye, towards = np.add(view.eye, by), np.add(view.towards, by)
+    return replace(view, eye=(float(eye[0]), float(eye[1])), towards=(float(towards[0]), float(towards[1])))
+
+
+def samples_of_equal_cost(rays_ours: float, rays_per_tree: float) -> int:
+    """Path trees that cost at least as many rays: the comparison never favours us."""
+    return max(1, int(np.ceil(rays_ours / rays_per_tree)))
