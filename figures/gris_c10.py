@@ -1,0 +1,108 @@
+"""GRIS 7.5: a least distance of reconnections, in a wedge and below furniture.
+
+Between points that nearly touch, the geometry term of a connection is unbounded; replay knows no geometry term.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from figures import criteria, offline, style
+from figures.figure import Arrays, Claim, Figure
+from figures.flatland import offline as one_frame
+from figures.references import reference
+from flatland2d import SCENES
+from flatland2d.radiosity import corners
+from restir_ref.batch import Array
+from restir_ref.metrics import SMALL
+from restir_ref.transport.paths import Connectability
+from restir_ref.transport.rays import arrive
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
+
+SCENE = "crease"
+DISTANCES = (0.0, 0.01, 0.05)
+NEAR = 0.05
+"""Pixels that see a point this near to another surface are crease pixels: the largest distance tested."""
+
+
+def chunks(preset: Any) -> Sequence[dict[str, int]]:
+    """One per distance."""
+    return [{"distance": k} for k in range(len(DISTANCES))]
+
+
+def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
+    """Independent images (count, 128) with one least distance."""
+    rule = Connectability(0.2, DISTANCES[chunk["distance"]])
+    return offline.render(offline.Method(one_frame, rule), SCENE, preset["count"], rng)
+
+
+def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
+    """Images (distance, count, n), rays (distance,), the reference, and distances to other surfaces (n,)."""
+    arrays = {name: np.stack([part[name] for part in results]) for name in results[0]}
+    return {**arrays, "reference": reference(SCENE).mean, "clearance": clearance()}
+
+
+def clearance() -> Array:
+    """Distance of what the middle of each pixel sees to the nearest other surface, (n,)."""
+    setting = SCENES[SCENE]()
+    sensor = setting.pinhole()
+    x, w, _ = sensor.ray(np.arange(sensor.n), np.full((1, sensor.n), 0.5))
+    v, _, _ = arrive(setting.scene, x, w)
+    a, b = corners(setting.scene)
+    edge = b - a
+    along = np.einsum("ds,dsn->sn", edge, v.x[:, None] - a[:, :, None]) / (edge**2).sum(axis=0)[:, None]
+    nearest = a[:, :, None] + np.clip(along, 0, 1) * edge[:, :, None]
+    distance = np.sqrt(((nearest - v.x[:, None]) ** 2).sum(axis=0))
+    distance[v.prim, np.arange(sensor.n)] = np.inf
+    return np.asarray(distance.min(axis=0))
+
+
+def errors(a: Arrays, k: int, mask: Array) -> Array:
+    """relMSE of every frame over some pixels, (R,)."""
+    truth = a["reference"]
+    relative = (a["images"][k] - truth) ** 2 / (truth**2 + (SMALL * truth.mean()) ** 2)
+    return np.asarray(relative[:, mask].mean(axis=1))
+
+
+def check(a: Arrays) -> list[Claim]:
+    """Crease pixels gain, the others do not change."""
+    near, claims = a["clearance"] < NEAR, []
+    for k, d in enumerate(DISTANCES[1:], start=1):
+        crease = criteria.ratio_below(errors(a, k, near), errors(a, 0, near), 0.8)
+        inside = errors(a, k, ~near).mean() / errors(a, 0, ~near).mean()
+        claims.append(Claim("GRIS-C10", crease, f"crease pixels, d = {d:.0%} / d = 0"))
+        claims.append(Claim("GRIS-C10", criteria.between(inside, 0.9, 1.1), f"interior, d = {d:.0%} / d = 0"))
+    return claims
+
+
+def draw(a: Arrays) -> "Picture":
+    """Error per pixel, and where the crease is."""
+    picture, axes = style.panels(1, 1, width=6.0, height=3.2)
+    axis, truth = axes[0, 0], a["reference"]
+    for k, d in enumerate(DISTANCES):
+        error = ((a["images"][k] - truth) ** 2 / truth**2).mean(axis=0)
+        axis.semilogy(error, label=f"d = {d:.0%} of the room")
+    for place in np.flatnonzero(a["clearance"] < NEAR):
+        axis.axvspan(place - 0.5, place + 0.5, color="#dddddd", lw=0, zorder=0)
+    axis.set(xlabel="pixel of the inset (crease pixels grey)", ylabel="relative squared error of a frame")
+    axis.set_title("Beside furniture: least distance of reconnections")
+    axis.legend()
+    return picture
+
+
+FIGURE = Figure(
+    id="GRIS-C10",
+    title="A least distance of reconnections",
+    world="flatland2d",
+    source="[GRIS 7.5]",
+    claims=("GRIS-C10",),
+    presets={"quick": {"count": 256}, "paper": {"count": 4096}},
+    chunks=chunks,
+    compute=compute,
+    combine=combine,
+    draw=draw,
+    check=check,
+)

@@ -1,0 +1,117 @@
+"""Offline renderers in flatland, frame by independent frame, at equal samples, rays and time.
+
+Path tracing is stored in units of UNIT trees: as many make an image as its price allows.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from figures.figure import Arrays
+from figures.flatland import HYBRID, Renderer, estimates, means, offline, path_tracing, view
+from figures.references import reference
+from restir_ref.batch import Array
+from restir_ref.chance import Chance, Live
+from restir_ref.loop import OFFLINE
+from restir_ref.transport.path_reuse import path_reuse
+from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
+from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
+
+UNIT = 4
+"""Path trees in one stored image of path tracing."""
+
+TREES_PER_SECOND_OF_OURS = 72
+"""Path trees that take as long as one offline frame per pixel: median over scenes of `make bench`, CPU time."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A renderer and the integrals it renders."""
+
+    render: Renderer
+    rule: Connectability = RECONNECTION
+    integrals: Callable[[Tracer], PathIntegrals] = PathIntegrals
+
+
+def reused(of: PathIntegrals, index: Array, chance: Chance) -> Array:
+    """One tree per pixel, reused by its tile."""
+    return np.asarray(path_reuse(of.tracer, index % of.n, chance).mean(axis=0))
+
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "path tracing": Method(path_tracing(UNIT)),
+        "path reuse": Method(reused),
+        "reconnection": Method(offline, RECONNECTION, ReconnectionAtX2),
+        "hybrid": Method(offline, HYBRID),
+    }
+)
+
+
+def chunks(scenes: Sequence[str], methods: Sequence[str]) -> list[dict[str, str]]:
+    """One chunk per scene and method."""
+    return [{"scene": scene, "method": method} for scene in scenes for method in methods]
+
+
+def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
+    """Images of one of the usual methods."""
+    return render(METHODS[chunk["method"]], chunk["scene"], preset[chunk["method"]], rng)
+
+
+def render(method: Method, scene: str, count: int, rng: np.random.Generator) -> Arrays:
+    """Independent images (count, 128) and rays per pixel of one."""
+    asked = Counter[str]()
+    of = view(scene, method.rule, asked, integrals=method.integrals)
+    found = estimates(method.render, of, asked, count, Live(rng))
+    return {"images": found.images, "rays": np.array(found.rays)}
+
+
+def combine(scenes: Sequence[str], methods: Sequence[str], results: Sequence[Arrays]) -> Arrays:
+    """All images and rays by "scene.method.name", and references by "scene.reference"."""
+    return combine_chunks(chunks(scenes, methods), results)
+
+
+def combine_chunks(done: Sequence[Mapping[str, str]], results: Sequence[Arrays]) -> Arrays:
+    """The same for any choice of scenes and methods."""
+    arrays = {
+        f"{chunk['scene']}.{chunk['method']}.{key}": part[key]
+        for chunk, part in zip(done, results, strict=True)
+        for key in part
+    }
+    return arrays | {f"{scene}.reference": reference(scene).mean for scene in {chunk["scene"] for chunk in done}}
+
+
+def after(a: Arrays, scene: str, method: str, T: int) -> Array:
+    """Means of T frames, (groups, n)."""
+    return means(a[f"{scene}.{method}.images"], T)
+
+
+def traced(a: Arrays, scene: str, trees: float) -> Array:
+    """Path tracing with at least so many trees, (groups, n)."""
+    return means(a[f"{scene}.path tracing.images"], int(np.ceil(trees / UNIT)))
+
+
+def equal_samples(T: int) -> float:
+    """Trees of T frames."""
+    return float(T * OFFLINE.trees)
+
+
+def equal_rays(a: Arrays, scene: str, method: str, T: int) -> float:
+    """Trees whose rays cost what T frames of a method do."""
+    per_tree = float(a[f"{scene}.path tracing.rays"]) / UNIT
+    return T * float(a[f"{scene}.{method}.rays"]) / per_tree
+
+
+def equal_time(T: int) -> float:
+    """Trees that take as long as T frames."""
+    return float(T * TREES_PER_SECOND_OF_OURS)
+
+
+def paired(errors: Array, others: Array) -> tuple[Array, Array]:
+    """As many groups of both."""
+    R = min(len(errors), len(others))
+    return errors[:R], others[:R]
