@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr, ndtri, stdtrit
+
+from restir_ref.batch import ratio
 
 BOOTSTRAP = 2000  # resamples behind a confidence interval
 STREAM = 0x5EED  # fixed stream of the bootstrap: the same errors always give the same verdict
@@ -90,6 +93,47 @@ def biased(estimates: ArrayLike, reference: float, low: float, high: float) -> O
     bias, error, text = _bias(np.asarray(estimates, dtype=float), reference)
     passed = abs(bias) >= 8 * error and abs(bias) > 0 and low <= bias / reference <= high
     return Outcome(text, f"|bias| ≥ 8 SE, relative bias in [{low:g}, {high:g}]", bool(passed))
+
+
+def sidak(checks: int, replicates: float = np.inf, z: float = 4.0) -> float:
+    """t with (1 - P(|T| > t))^checks = 1 - P(|Z| > z), Z normal, T Student's ratio of `replicates` (normal for inf).
+
+    So many independent checks together exceed t as rarely as one exceeds z; checks that depend on one
+    another, such as an image and its blocks, even less often (Sidak's inequality).
+    """
+    tail = -np.expm1(np.log1p(-2 * ndtr(-z)) / checks) / 2
+    return float(-ndtri(tail) if np.isinf(replicates) else -stdtrit(replicates - 1, tail))
+
+
+def all_unbiased(
+    estimates: ArrayLike, references: ArrayLike, eps: float = 0.005, replicates: int = 64, families: int = 1
+) -> Outcome:
+    """|mean - reference| <= t SE and SE <= eps |reference| for all K columns of (R, K) replicates, R >= `replicates`.
+
+    t = sidak(K families, R): all columns of so many families together raise a false alarm as rarely as one
+    |z| > 4, 6 times in 100 000.  A bias of (t + 4) eps is always seen, one of t SE every other time.
+    Hazard: replicates must be means of many samples; with one exponential sample each, nine columns
+    raise a false alarm 4 times in 1000.
+    """
+    e, truth = np.asarray(estimates, dtype=float), np.asarray(references, dtype=float)
+    if e.ndim != 2 or truth.shape != e.shape[1:] or not truth.size or len(e) < 2:
+        raise ValueError(f"needs estimates (R, K), R > 1, and references (K,), got shapes {e.shape} and {truth.shape}")
+    R, K = e.shape
+    t, error, bias = sidak(K * families, R), e.std(axis=0, ddof=1) / np.sqrt(R), e.mean(axis=0) - truth
+    passed = (np.abs(bias) <= t * error + 1e-12 * np.abs(truth)) & (error <= eps * np.abs(truth))
+    worst = int(np.argmax(np.where(passed, ratio(np.abs(bias), error), np.inf)))
+    text = f"worst of {K}, number {worst}: {_bias(e[:, worst], float(truth[worst]))[2]}"
+    rule = f"each |bias| ≤ {t:.3g} SE (all together as one |z| ≤ 4), SE ≤ {eps:.3g} of the truth, R ≥ {replicates}"
+    return Outcome(text, rule, bool(passed.all() and replicates <= R))
+
+
+def mean_and_blocks(images: ArrayLike, blocks: int = 8) -> NDArray[np.float64]:
+    """The image's mean and the means of blocks of neighbouring pixels, (..., n) -> (..., 1 + blocks)."""
+    pixels = np.asarray(images, dtype=float)
+    if not 0 < blocks <= pixels.shape[-1]:
+        raise ValueError(f"{blocks} blocks need as many pixels, but the image has {pixels.shape[-1]}")
+    parts = [pixels, *np.array_split(pixels, blocks, axis=-1)]
+    return np.stack([part.mean(axis=-1) for part in parts], axis=-1)
 
 
 def ratio_below(errors: ArrayLike, others: ArrayLike, limit: float) -> Outcome:

@@ -36,6 +36,8 @@ MODULES: tuple[str, ...] = (
     "figures.gris_e40",
     "figures.gris_e41",
     "figures.gris_c15",
+    "figures.gris_f05",
+    "figures.flat_scenes",
 )
 ROOT = Path(__file__).resolve().parent.parent
 ID = re.compile(r"[A-Z][A-Z0-9]*-[A-Za-z0-9-]+")

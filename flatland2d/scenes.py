@@ -5,14 +5,16 @@ Roughness is perceptual (alpha = roughness^2); lengths are in units of the unit 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from itertools import chain as joined
 from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
 
-from flatland2d.sensors import FluenceMap, Pinhole
+from flatland2d.sensors import FluenceMap, Pinhole, check_view
 from flatland2d.space import PLANE
+from restir_ref.guards import whole
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.scene import Ball, Facet, Scene, scene
 
@@ -24,7 +26,11 @@ INSET = 128
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """A scene with the place to look from, and the inset that shows why it matters: `crop`, its first film pixel."""
+    """A scene with the place to look from, and the inset that shows why it matters: `crop`, its first film pixel.
+
+    Raises ValueError for a depth that is no whole number >= 1, and for an eye or a map in a solid or out of
+    doors; so does `dataclasses.replace`, the way to move an eye.
+    """
 
     scene: Scene
     eye: Point
@@ -34,6 +40,11 @@ class Setting:
     half: float = 0.6
     low: Point = (0.0, 0.0)
     high: Point = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        whole(self.depth, 1, "the path depth", "It counts scattering vertices; 1 is direct light.")
+        check_view(self.scene, Pinhole(self.eye, self.towards, 64, self.half, film=64))
+        check_view(self.scene, self.fluence(8, 8))
 
     def pinhole(self, n: int = INSET, first: int | None = None) -> Pinhole:
         """n pixels of the virtual film, from pixel `first` on; the scene's inset unless told otherwise."""
@@ -101,7 +112,12 @@ def matte_cornell() -> Setting:
 
 
 def ajar(gap: float = 0.06) -> Setting:
-    """FS3: two rooms joined by a slit, the light in the other one: rare, valuable paths."""
+    """FS3: two rooms joined by a slit, the light in the other one: rare, valuable paths.
+
+    Raises ValueError for a gap that does not fit between .3 and the ceiling.
+    """
+    if not 0 < gap < 0.7:
+        raise ValueError(f"the gap of the door must be in (0, 0.7), but is {gap}.")
     wall = [*chain([(1, 0), (1, 0.3)], 0), *chain([(1, 0.3 + gap), (1, 1)], 0)]
     facets = [*room(0, 2.0), *wall, *chain([(1.9, 0.995), (1.5, 0.995)], 0, 30.0)]
     return Setting(scene(PLANE, [matte(0.75)], facets), (0.5, 0.7), (0.35, 0.1), high=(2.0, 1.0))
@@ -216,3 +232,12 @@ SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
         )
     }
 )
+
+
+def setting(name: str) -> Setting:
+    """The scene of that name.  Raises ValueError for an unknown one, with the nearest."""
+    if name not in SCENES:
+        near = get_close_matches(name, SCENES, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(SCENES)}."
+        raise ValueError(f"there is no scene {name!r}: {hint}")
+    return SCENES[name]()

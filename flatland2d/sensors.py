@@ -1,14 +1,16 @@
 """Two sensors: a pinhole row, and a fluence map whose pixels are places in the plane."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from restir_ref.batch import Array
+from restir_ref.guards import whole
 from restir_ref.transport.paths import Sensor
 from restir_ref.transport.rays import arrive
 from restir_ref.transport.scene import Scene
-from restir_ref.transport.vectors import normalize
+from restir_ref.transport.vectors import dot, normalize
 
 FILM = 1920
 """Pixels of the virtual film: the papers' pixel radii mean what they mean there."""
@@ -19,7 +21,8 @@ class Pinhole:
     """A row of n pixels, a crop of a film of `film` pixels that starts at pixel `first`.
 
     eye and towards are points; `half` is the tangent of half the field of view.
-    Raises ValueError for a crop that is empty or not on the film, no direction, or no field of view.
+    Raises ValueError for points without 2 coordinates, a crop that is empty, not on the film or not of
+    whole pixels, no direction, or no field of view.
     """
 
     eye: tuple[float, float]
@@ -30,10 +33,13 @@ class Pinhole:
     film: int = FILM
 
     def __post_init__(self) -> None:
+        _check_points(self.eye, self.towards)
         if not (self.n > 0 and 0 <= self.first <= self.film - self.n):
             raise ValueError(
                 f"a crop needs pixels on the film, 0 .. {self.film - 1}, but begins at {self.first} and has {self.n}."
             )
+        for name, pixels in (("n", self.n), ("first", self.first), ("film", self.film)):
+            whole(pixels, 0, f"{name} of a pinhole", "It counts pixels.")
         if not 0 < self.half < np.inf:
             raise ValueError(
                 f"half, the tangent of half the field of view, must be positive and finite, but is {self.half}."
@@ -48,18 +54,30 @@ class Pinhole:
 
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A ray through the pixel; box filter, weight 1."""
-        forward = normalize(np.subtract(self.towards, self.eye)[:, None])
-        right = np.stack([forward[1], -forward[0]])
+        forward, right = self._axes()
         s = (2 * (self.first + pixel + u[0]) / self.film - 1) * self.half
         w = normalize(forward + s * right)
         return np.broadcast_to(np.array(self.eye, dtype=float)[:, None], w.shape), w, np.ones(len(pixel))
+
+    def project(self, x: Array) -> Array:
+        """Where points (2, N) are on the crop, pixel + u, also beyond its ends; inf behind the eye."""
+        forward, right = self._axes()
+        to = x - np.array(self.eye, dtype=float)[:, None]
+        depth = dot(forward, to)
+        s = dot(right, to) / np.where(depth > 0, depth, 1)
+        return np.where(depth > 0, (s / self.half + 1) * self.film / 2 - self.first, np.inf)
+
+    def _axes(self) -> tuple[Array, Array]:
+        """Forward and to the right, (2, 1) each."""
+        forward = normalize(np.subtract(self.towards, self.eye)[:, None])
+        return forward, np.stack([forward[1], -forward[0]])
 
 
 @dataclass(frozen=True)
 class FluenceMap:
     """columns x rows pixels over the rectangle low .. high; each integrates radiance from all directions.
 
-    Raises ValueError for no pixels, or an empty rectangle.
+    Raises ValueError for no whole pixels, points without 2 coordinates, or an empty rectangle.
     """
 
     low: tuple[float, float]
@@ -70,6 +88,9 @@ class FluenceMap:
     def __post_init__(self) -> None:
         if not (self.columns > 0 and self.rows > 0):
             raise ValueError(f"a fluence map needs pixels, but has {self.columns} columns and {self.rows} rows.")
+        for name, pixels in (("columns", self.columns), ("rows", self.rows)):
+            whole(pixels, 1, f"{name} of a fluence map", "It counts pixels.")
+        _check_points(self.low, self.high)
         size = np.subtract(self.high, self.low)
         if not (np.isfinite(size).all() and (size > 0).all()):
             raise ValueError(f"a fluence map needs low below high, but has {self.low} and {self.high}.")
@@ -93,6 +114,12 @@ class FluenceMap:
         return x, np.stack([np.cos(angle), np.sin(angle)]), np.full(len(pixel), 2 * np.pi)
 
 
+def _check_points(*points: Sequence[float]) -> None:
+    for point in points:
+        if np.shape(point) != (2,):
+            raise ValueError(f"a point of the plane has 2 coordinates, but this one is {point}.")
+
+
 def facing(scene: Scene, sensor: Sensor) -> Array:
     """What the middle of each pixel sees: 1 the front of a surface, -1 a back, 0 nothing; (n,)."""
     pixel = np.arange(sensor.n)
@@ -104,4 +131,7 @@ def facing(scene: Scene, sensor: Sensor) -> Array:
 def check_view(scene: Scene, sensor: Sensor) -> None:
     """Raise ValueError if no pixel sees the front of a surface: the sensor is inside a solid, or out of doors."""
     if not (facing(scene, sensor) > 0).any():
-        raise ValueError(f"{sensor} sees only backs of surfaces, or nothing: it stands in a solid or outside the room.")
+        raise ValueError(
+            f"{sensor} sees only backs of surfaces, or nothing: it stands in a solid or outside the room. "
+            f"Move it, or turn the facets round: their fronts are on the left of the way from corner to corner."
+        )

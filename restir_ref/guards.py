@@ -1,5 +1,7 @@
 """Checks of what users hand in; a failure names the value, its place and the remedy."""
 
+from numbers import Integral
+
 import numpy as np
 
 from restir_ref.batch import Array
@@ -30,3 +32,9 @@ def per_column(values: Array, n: int, what: str) -> Array:
     raise ValueError(
         f"{what} has shape {values.shape}, but this batch has {n} columns: the last axis must be {n}, and the only one."
     )
+
+
+def whole(value: object, least: int, what: str, remedy: str) -> None:
+    """Raise ValueError, naming it, for a value that is no integer >= `least`."""
+    if not (isinstance(value, Integral) and int(value) >= least):
+        raise ValueError(f"{what} must be a whole number >= {least}, but is {value!r}. {remedy}")

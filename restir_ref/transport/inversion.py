@@ -11,10 +11,20 @@ import numpy as np
 from restir_ref.batch import Array, take
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
-from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.paths import Path, Tracer, leaves, trace
 from restir_ref.transport.rays import vertex
+from restir_ref.transport.record import record
 from restir_ref.transport.shifts import replay
 from restir_ref.transport.vectors import normalize
+
+
+def traced(t: Tracer, u: Array, pixel: Array, k: Array, nee: Array) -> Path:
+    """The record of the path that primary samples u (D, N) give in `pixel` (N,) as leaf (k, nee)."""
+    tree = trace(t, u, pixel)
+    F = np.zeros((t.scene.C, len(k)))
+    for at, by_light, value in leaves(tree):
+        F = np.where((k == at) & (nee == by_light), value, F)
+    return record(t, tree, k, nee, F)
 
 
 @dataclass(frozen=True)
@@ -38,19 +48,19 @@ def connection(t: Tracer, x: Path, pixel: Array) -> Connection:
 
 
 def primary_sample(tx: Tracer, x: Path, pixel_x: Array, ty: Tracer, y: Path, pixel_y: Array) -> Array:
-    """u^y (D, N) of the offset path y of base path x; equal to u^x where nothing reconnects."""
-    u = np.array(x.u)
+    """u^y (D, N) of the offset path y of a base path x that was traced; y.u where nothing reconnects."""
+    u = np.array(y.u)
     for c in np.unique(x.c[x.c > 0]):
         columns = np.flatnonzero(x.c == c)
         part_x, part_y = take(x, columns), take(y, columns)
         at_x, at_y = connection(tx, part_x, pixel_x[columns]), connection(ty, part_y, pixel_y[columns])
-        u[:, columns] = _reconnected(ty, part_x, at_x, at_y, int(c))
+        u[:, columns] = _reconnected(ty, part_x, part_y.u, at_x, at_y, int(c))
     return u
 
 
-def _reconnected(t: Tracer, x: Path, at_x: Connection, at_y: Connection, c: int) -> Array:
-    """Replace the numbers of x_(c-1) and, where a BSDF sample leaves it, of x_c."""
-    table, space, u = t.scene.materials, t.scene.space, np.array(x.u)
+def _reconnected(t: Tracer, x: Path, u_y: Array, at_x: Connection, at_y: Connection, c: int) -> Array:
+    """y's own numbers up to y_(c-2), then those of y_(c-1) and, where a BSDF sample leaves it, of x_c."""
+    table, space, u = t.scene.materials, t.scene.space, np.array(u_y)
     t.lobe_number(u, c - 1)[:] = mat.choose_number(at_x.P_in, at_y.P_in, x.lobe_in, t.lobe_number(x.u, c - 1))
     local = space.to_local(at_y.v.n, at_y.w)
     t.direction_numbers(u, c - 1)[:] = mat.invert_lobe(table, space, at_y.v, x.lobe_in, local)

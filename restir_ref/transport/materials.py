@@ -89,7 +89,9 @@ class LobeSurface:
 
 
 def table(materials: Sequence[Material], channels: int) -> Table:
-    """Compile materials; raises ValueError for what is no material (see `check`)."""
+    """Compile materials; raises ValueError for none, or what is no material (see `check`)."""
+    if not materials:
+        raise ValueError("a scene needs at least one material; a black one is Material([Layer('lambert', (0.0,))]).")
     for material in materials:
         check(material, channels)
     L = max(len(material.layers) for material in materials)
@@ -137,7 +139,7 @@ def _check_layer(layer: Layer, channels: int) -> None:
         raise ValueError(
             f"the roughness of {layer.kind} must be in (0, 1], but is {layer.roughness}; 0 needs a delta lobe."
         )
-    if len(layer.colour) != channels or not all(0 <= c <= 1 for c in layer.colour):
+    if np.shape(layer.colour) != (channels,) or not all(0 <= c <= 1 for c in layer.colour):
         raise ValueError(
             f"the colour of {layer.kind} must have one number in [0, 1] per channel of the lights' emission, "
             f"here {channels}, but is {layer.colour}."

@@ -10,11 +10,12 @@ Primary numbers: the sensor's, then 2 d per vertex: lobe 1, direction d-1, light
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from restir_ref.batch import Array, ratio
+from restir_ref.guards import whole
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.rays import arrive, emitted, light_pdf, sample_light
@@ -42,10 +43,18 @@ class Connectability:
     """When two vertices may be connected: both lobes this rough, and this far apart.  [GRIS 7.5]
 
     Roughness is perceptual, distance in scene units.  Delta lobes never connect.
+    Raises ValueError for thresholds that are negative or NaN; infinite ones are never met.
     """
 
     roughness: float
     distance: float
+
+    def __post_init__(self) -> None:
+        if not (self.roughness >= 0 and self.distance >= 0):
+            raise ValueError(
+                f"thresholds of connectability must be >= 0, but are roughness {self.roughness} and distance "
+                f"{self.distance}: 0 connects whatever can be, inf nothing."
+            )
 
 
 RECONNECTION = Connectability(0.0, 0.0)
@@ -60,12 +69,27 @@ def connectable(rule: Connectability, r_x: Array, r_z: Array, distance: Array) -
 
 @dataclass(frozen=True, eq=False)
 class Tracer:
-    """A scene seen by a sensor, up to `depth` scattering vertices, with a rule for connections."""
+    """A scene seen by a sensor, up to `depth` scattering vertices, with a rule for connections.
+
+    Raises ValueError for a depth that is no whole number >= 1, or a sensor of another dimension than the scene.
+    """
 
     scene: Scene
     sensor: Sensor
     depth: int
     rule: Connectability
+
+    LEAST: ClassVar[int] = 1
+    """The smallest depth."""
+
+    def __post_init__(self) -> None:
+        whole(self.depth, self.LEAST, "the path depth", "It counts scattering vertices; 1 is direct light.")
+        x, _, _ = self.sensor.ray(np.zeros(1, dtype=int), np.full((self.sensor.numbers, 1), 0.5))
+        if x.shape[:1] != (self.scene.space.d,):
+            raise ValueError(
+                f"{self.sensor} has rays in {len(x)} dimensions, but the scene has {self.scene.space.d}: "
+                f"take a sensor of the scene's own world."
+            )
 
     @property
     def D(self) -> int:
@@ -88,6 +112,13 @@ class Tracer:
 
     def _start(self, i: int) -> int:
         return self.sensor.numbers + 2 * self.scene.space.d * (i - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Suffix(Tracer):
+    """What is left of a path behind one of its vertices: it may meet a light without scattering."""
+
+    LEAST = 0
 
 
 @dataclass(frozen=True)
@@ -192,7 +223,15 @@ class Tree:
 
 
 def trace(t: Tracer, u: Array, pixel: Array) -> Tree:
-    """The whole tree of a primary sample u (D, N)."""
+    """The whole tree of a primary sample u (D, N).
+
+    Raises ValueError for u of another shape.
+    """
+    if u.shape != (t.D, len(pixel)):
+        raise ValueError(
+            f"a primary sample of this tracer has {t.D} numbers for each of {len(pixel)} pixels, but u has shape "
+            f"{u.shape}: draw chance.uniform((tracer.D, len(pixel)))."
+        )
     v, r, T = first_hit(t, u, pixel)
     bare = emitted(t.scene, v)
     seen = Leaf(bare, bare, np.zeros(len(pixel)))

@@ -21,11 +21,13 @@ def first(seed, figure, number):
     return tuple(jobs.stream(seed, figure, number).integers(2**62, size=2))
 
 
+@pytest.mark.claims("COM-A07")
 @given(st.integers(0, 2**128), st.text(), st.integers(0, 2**31))
 def test_a_stream_is_a_function_of_seed_figure_and_number(seed, figure, number):
     assert first(seed, figure, number) == first(seed, figure, number)
 
 
+@pytest.mark.claims("COM-A07")
 def test_other_seeds_figures_and_numbers_have_other_streams():
     names = list(itertools.product((0, 1), ("DEMO-F01", "DEMO-F02"), range(50)))
     assert len({first(*name) for name in names}) == len(names)
@@ -36,6 +38,7 @@ def ran(workers, work=WORK):
         return {result.job.number: result for result in jobs.completed(pool, work, 2 * workers)}
 
 
+@pytest.mark.claims("COM-A07")
 def test_two_workers_find_what_one_finds():
     one, two = ran(1), ran(2)
     assert sorted(one) == sorted(two) == [0, 1, 2, 3, 4]

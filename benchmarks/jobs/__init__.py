@@ -1,0 +1,19 @@
+"""The jobs of `make evidence`, one module per question."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from benchmarks.jobs import extremes, references, retracing, roundtrips
+from benchmarks.jobs.job import Done, Job
+
+JOBS: Mapping[str, Job] = MappingProxyType(
+    {
+        "references": references.JOB,
+        "round trips": roundtrips.JOB,
+        "re-tracing": retracing.JOB,
+        "extremes": extremes.JOB,
+    }
+)
+PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType({"references": references.publish})
+"""What else a job leaves behind, in the checkout at a path."""

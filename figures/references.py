@@ -1,0 +1,87 @@
+"""Reference images of the flatland scenes: long path tracing, or a closed form, stored with their standard errors.
+
+`make evidence ARGS=references` makes them.  Each carries a fingerprint of its scene, sensor and depth:
+a scene that has changed since has no reference.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from figures import store
+from figures.errors import FigureError
+from figures.figure import Arrays
+from flatland2d.scenes import SCENES, Setting
+from restir_ref.transport.lobes import KINDS
+
+PATH = Path(__file__).with_suffix(".npz")
+KEY = store.canonical({"what": "reference images of flatland", "format": 1})
+REMEDY = "run: make evidence ARGS=references"
+DIGITS = 12
+"""Digits that count: sines and tangents in scenes end differently on other machines."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The image seen by `SCENES[name]().pinhole()`, (128,), one channel.
+
+    error    standard error of each pixel (128,), and `image_error` that of the image's mean
+    samples  per pixel, 0 where nothing is sampled;  how  in words
+    """
+
+    mean: NDArray[np.float64]
+    error: NDArray[np.float64]
+    image_error: float
+    samples: int
+    how: str
+
+
+def reference(name: str, path: Path = PATH) -> Reference:
+    """The reference of one scene; raises FigureError if there is none, or if the scene is another one now."""
+    stored = stored_at(path)
+    if f"{name}.mean" not in stored:
+        raise FigureError(f"{path.name} holds no reference of the scene {name!r}; {REMEDY}")
+    if str(stored[f"{name}.scene"]) != fingerprint(SCENES[name]()):
+        raise FigureError(f"the scene {name!r} has changed since its reference was computed; {REMEDY}")
+    mean, error = stored[f"{name}.mean"], stored[f"{name}.error"]
+    return Reference(
+        mean, error, float(stored[f"{name}.image_error"]), int(stored[f"{name}.samples"]), str(stored[f"{name}.how"])
+    )
+
+
+def stored_at(path: Path) -> Arrays:
+    """Everything in a file of references, none if there is no file; raises FigureError if it is damaged."""
+    found = store.load(path, KEY)
+    if found.state in ("ours", "absent"):
+        return found.arrays
+    raise FigureError(f"{path.name} cannot be used ({found.trouble}); restore it from git, or {REMEDY}")
+
+
+def save(references: Mapping[str, Reference], path: Path = PATH) -> None:
+    """Write references of today's scenes into the file, in one step; a longer one of the same scene stays."""
+    arrays = stored_at(path)
+    for name, each in references.items():
+        scene = fingerprint(SCENES[name]())
+        longer = arrays.get(f"{name}.samples", -1) > each.samples
+        if not (longer and str(arrays[f"{name}.scene"]) == scene):
+            values: dict[str, Any] = {**vars(each), "scene": scene}
+            arrays |= {f"{name}.{field}": np.asarray(value) for field, value in values.items()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    store.save(path, arrays, KEY)
+
+
+def fingerprint(setting: Setting) -> str:
+    """SHA-256, shortened, over what the image depends on: shapes, materials, lights, sensor and depth."""
+    scene, table = setting.scene, setting.scene.materials
+    kinds = [KINDS[kind] for kind in table.kind]
+    total = hashlib.sha256(repr((setting.pinhole(), setting.depth, kinds)).encode())
+    shapes = (scene.corners, scene.centres, scene.radii, scene.material, scene.emission)
+    for array in (*shapes, table.roughness, table.colour, table.weight, table.eta):
+        values = np.round(np.asarray(array, dtype=float), DIGITS) + 0.0
+        total.update(repr(values.shape).encode() + values.tobytes())
+    return total.hexdigest()[:16]

@@ -1,0 +1,283 @@
+"""What one can hold against a shift of paths, path by path.  `judge` runs it all.
+
+A shift is right if it returns, if J is the density with which primary samples are stretched, and if the
+tracer, given the primary sample of the offset path, finds that path.  Errors are in units of what is tolerated.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from restir_ref.batch import Array, ratio, take
+from restir_ref.chance import Chance
+from restir_ref.integrals import Pixels, shifted
+from restir_ref.transport.inversion import traced
+from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.transport.vectors import norm
+
+POSITIONS, DENSITIES, DERIVATIVES = 1e-9, 1e-6, 1e-5
+"""Tolerances: of primary numbers, directions, and places in units of the scene; relative, of densities and
+contributions, which have peaks; relative, of Jacobians by finite differences."""
+
+NOTHING = 1e-9
+"""A shift whose p_hat(y) J / p_hat(x) is below may be defined or not: connections within a plane, whose cosines are
+rounding errors."""
+
+Numbers = Callable[[Tracer, Path, Array, Tracer, Path, Array], Array]
+"""(tx, x, i, ty, y, j) -> u^y (D, N), the primary sample of y = T(x) for a path x traced in pixels i."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many base paths are shifted, how many Jacobians measured, in steps of which size, how far pixels are apart.
+
+    edge_cases is the share of paths that floating point may decide differently there and back: grazing
+    occlusion, corners, and lobes chosen by a hair.
+    """
+
+    paths: int = 20_000
+    jacobians: int = 200
+    step: float = 1e-5
+    reach: int = 200
+    edge_cases: float = 2e-4
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Base paths x of pixels i with weights W, offset paths y = T_ij(x) in pixels j, and the way back; a batch."""
+
+    x: Path
+    i: Array
+    W: Array
+    y: Path
+    j: Array
+    J: Array
+    back: Path
+    J_back: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Whose shift is judged, by which numbers and chance, and trials in which some light arrived in pixel j."""
+
+    of: PathIntegrals
+    effort: Effort
+    numbers: Numbers
+    chance: Chance
+    good: Trial
+
+    def shift(self, x: Path, i: Array, j: Array) -> tuple[Path, Array]:
+        """T_ij(x), J."""
+        y = shifted(x, Pixels(self.of, i), Pixels(self.of, j))
+        return y.x, y.J
+
+    def u_y(self, x: Path, i: Array, y: Path, j: Array) -> Array:
+        """u^y (D, N)."""
+        return self.numbers(self.of.tracer, x, i, self.of.tracer, y, j)
+
+    def p_hat(self, x: Path) -> Array:
+        """The target, (N,)."""
+        return self.of.target(np.zeros(len(x.k), dtype=int), x)
+
+
+def trials(of: PathIntegrals, effort: Effort, chance: Chance) -> Trial:
+    """Shift random paths of random pixels, drawn as `initial` draws them, to pixels nearby and back.
+
+    Distances are of all orders of magnitude up to the reach.
+    """
+    u = chance.uniform((effort.paths,))
+    i, j = pairs(of.n, np.floor(min(effort.reach, of.n - 1) ** u).astype(int), chance)
+    ((x, W),) = of.candidates(i, chance)
+    y = shifted(x, Pixels(of, i), Pixels(of, j))
+    back = shifted(y.x, Pixels(of, j), Pixels(of, i))
+    return Trial(x, i, W, y.x, j, y.J, back.x, back.J)
+
+
+def pairs(n: int, distance: Array, chance: Chance) -> tuple[Array, Array]:
+    """Pixels i, j (N,) at given distances (N,) below n; which one is i is chance, so that they are exchangeable."""
+    u, first = chance.uniform((2, len(distance)))
+    low = np.floor(u * (n - distance)).astype(int)
+    return np.where(first < 0.5, low, low + distance), np.where(first < 0.5, low + distance, low)
+
+
+@dataclass(frozen=True)
+class Offender:
+    """A path that breaks a law, in batches of one column: x of pixel i, y = T(x) in pixel j, and what is wrong."""
+
+    x: Path
+    i: Array
+    y: Path
+    j: Array
+    J: Array
+    what: str
+    found: float
+    expected: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """How many were tested, broke the law, and may; the worst error in units of what is tolerated, and whose it is."""
+
+    tested: int
+    failed: int
+    allowed: float
+    worst: float
+    offender: Offender | None = None
+
+    @property
+    def red(self) -> bool:
+        """Too many failed, or nothing could be tested."""
+        return self.failed > self.allowed or not self.tested
+
+
+# What was found and expected, quantity by quantity.
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Values found and expected, (N,) each; the error is in units of what is tolerated."""
+
+    name: str
+    found: Array
+    expected: Array
+    error: Array
+
+
+def equal(name: str, found: Array, expected: Array) -> Quantity:
+    """Discrete: any difference is too much."""
+    return Quantity(name, found, expected, np.where(found == expected, 0.0, np.inf))
+
+
+def relative(name: str, found: Array, expected: Array, tolerance: float) -> Quantity:
+    """|found - expected| over the larger one."""
+    error = ratio(np.abs(found - expected), np.maximum(np.abs(found), np.abs(expected)))
+    return Quantity(name, found, expected, _known(error) / tolerance)
+
+
+def apart(name: str, found: Array, expected: Array, where: Array, unit: float = 1.0) -> Quantity:
+    """|found - expected| of vectors (K, N) in units of `unit`, looked at `where` (N,) or (K, N)."""
+    distance = norm(np.where(where, found - expected, 0.0)) / unit
+    return Quantity(name, distance, np.zeros_like(distance), _known(distance) / POSITIONS)
+
+
+def _known(error: Array) -> Array:
+    return np.where(np.isnan(error), np.inf, error)
+
+
+def same_path(case: Case, found: Path, expected: Path) -> list[Quantity]:
+    """All that two records of one path agree in; numbers count up to the reconnection, where they get stale."""
+    t, met = case.of.tracer, expected.c > 0
+    row = np.arange(t.D)[:, None] - t.sensor.numbers
+    fresh = ~met | (row < 2 * t.scene.space.d * (expected.c - 2))
+    discrete = [(each, getattr(found, each), getattr(expected, each)) for each in ("k", "nee", "c")]
+    at_z = [
+        (each, getattr(found, each) * met, getattr(expected, each) * met) for each in ("prim", "lobe_in", "lobe_out")
+    ]
+    return [
+        *(equal(*each) for each in (*discrete, *at_z)),
+        apart("u before the reconnection", found.u, expected.u, fresh),
+        apart("x_c", found.z, expected.z, met, t.scene.extent),
+        apart("direction leaving x_c", found.out, expected.out, met & (expected.c <= expected.k)),
+        relative("A", found.A, expected.A, DENSITIES),
+        relative("p_hat", case.p_hat(found), case.p_hat(expected), DENSITIES),
+    ]
+
+
+def finding(case: Case, at: Trial, quantities: list[Quantity]) -> Finding:
+    """Count the columns of `at` in which a quantity is off, and name the worst."""
+    error = np.stack([each.error for each in quantities])
+    failed, tested = int((error > 1).any(axis=0).sum()), error.shape[1]
+    allowed, worst = case.effort.edge_cases * tested, float(error.max(initial=0))
+    if not failed:
+        return Finding(tested, failed, allowed, worst)
+    which, n = divmod(int(error.argmax()), tested)
+    what = quantities[which]
+    return Finding(tested, failed, allowed, worst, offender(at, n, what.name, what.found[n], what.expected[n]))
+
+
+def offender(at: Trial, n: int, what: str, found: float, expected: float) -> Offender:
+    """Column n of trials, and what is wrong with it."""
+    one = take(at, np.array([n]))
+    return Offender(one.x, one.i, one.y, one.j, one.J, what, float(found), float(expected))
+
+
+# The checks.
+
+
+def there_and_back(case: Case) -> Finding:
+    """T_ji(T_ij(x)) = x.  [GRIS 7.1]"""
+    at = take(case.good, np.flatnonzero(case.good.J_back > 0))
+    return finding(case, at, same_path(case, at.back, at.x))
+
+
+def defined_back(case: Case) -> Finding:
+    """T_ji is defined wherever T_ij leads: nothing is refused one way only.  [GRIS 7.1]"""
+    return finding(
+        case, case.good, [equal("T_ji is defined", case.good.J_back > 0, np.ones(len(case.good.J), dtype=bool))]
+    )
+
+
+def inverse_jacobians(case: Case) -> Finding:
+    """J_ij J_ji = 1."""
+    at = take(case.good, np.flatnonzero(case.good.J_back > 0))
+    return finding(case, at, [relative("J_ji", at.J_back, 1 / at.J, POSITIONS)])
+
+
+def traced_from_scratch(case: Case) -> Finding:
+    """The tracer, given u^y, finds y."""
+    return finding(case, case.good, same_path(case, retraced(case), case.good.y))
+
+
+def retraced(case: Case) -> Path:
+    """What the tracer finds in pixels j, given u^y."""
+    at = case.good
+    return traced(case.of.tracer, case.u_y(at.x, at.i, at.y, at.j), at.j, at.x.k, at.x.nee)
+
+
+def shifted_again(case: Case) -> Finding:
+    """An offset path is a path: shifted on to a third pixel it becomes what the freshly traced one becomes."""
+    at, fresh = case.good, retraced(case)
+    on = np.clip(2 * at.j - at.i, 0, case.of.n - 1)
+    (z, J), (z_fresh, J_fresh) = case.shift(at.y, at.j, on), case.shift(fresh, at.j, on)
+    something = np.maximum(case.p_hat(z) * J, case.p_hat(z_fresh) * J_fresh) > NOTHING * case.p_hat(at.y)
+    compared = [*same_path(case, z, z_fresh), relative("J", J, J_fresh, DENSITIES)]
+    both = (J > 0) & (J_fresh > 0)
+    compared = [replace(each, error=np.where(both, each.error, 0)) for each in compared]
+    compared = [equal("T is defined", J > 0, J_fresh > 0), *compared]
+    return finding(case, at, [replace(each, error=np.where(something, each.error, 0)) for each in compared])
+
+
+def finite_differences(case: Case) -> Finding:
+    """J = |det du^y / du^x|, differences in two steps extrapolated; where these disagree nothing is decided."""
+    at = take(case.good, spread(case.good.x, case.effort.jacobians))
+    coarse, fine = (stretch(case, at, h) for h in (2 * case.effort.step, case.effort.step))
+    decided = np.flatnonzero(np.abs(fine - coarse) <= DERIVATIVES * np.abs(fine))
+    at, measured = take(at, decided), ((4 * fine - coarse) / 3)[decided]
+    return finding(case, at, [relative("J", at.J, measured, DERIVATIVES)])
+
+
+def spread(x: Path, most: int) -> Array:
+    """At most so many columns, evenly from all kinds (k, nee, c) of paths."""
+    _, kind = np.unique(np.stack([x.k, x.nee, x.c]), axis=1, return_inverse=True)
+    order = np.argsort(kind, kind="stable")
+    first = np.searchsorted(kind[order], kind[order])
+    return np.asarray(order[np.argsort(np.arange(len(order)) - first, kind="stable")][:most])
+
+
+def stretch(case: Case, at: Trial, h: float) -> Array:
+    """|det du^y / du^x| by central differences (N,); NaN where a discrete choice changes within the step."""
+    (D, N), t = at.x.u.shape, case.of.tracer
+    steps = h * np.stack([np.eye(D), -np.eye(D)])  # sign, number
+    u = (at.x.u[:, None, None, :] + np.moveaxis(steps, -1, 0)[..., None]).reshape(D, -1)
+    i, j, k, nee, c = (np.tile(each, 2 * D) for each in (at.i, at.j, at.x.k, at.x.nee, at.x.c))
+    x = traced(t, np.clip(u, 0, 1 - 2**-53), i, k, nee)
+    y, J = case.shift(x, i, j)
+    same = np.flatnonzero((J > 0) & (x.c == c) & ((u >= 0) & (u < 1)).all(axis=0))
+    u_y = np.full_like(u, np.nan)
+    u_y[:, same] = case.u_y(take(x, same), i[same], take(y, same), j[same])
+    plus, minus = np.moveaxis(u_y.reshape(D, 2, D, N), 1, 0)  # number of y, number of x, column
+    matrix = np.moveaxis(plus - minus, -1, 0) / (2 * h)
+    measured = np.abs(np.linalg.det(np.nan_to_num(matrix)))
+    return np.where(np.isnan(matrix).any(axis=(1, 2)), np.nan, measured)

@@ -1,0 +1,316 @@
+"""Pictures show what is there: every segment, all the light of a bundle, vertices where the tracer has them."""
+
+import re
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from figures import flat_scenes, gris_f05, style
+from figures.figure import undeclared, verdict_of
+from flatland2d import SCENES, pictures, shift_pictures
+from flatland2d.fluence import direct, fluence, fluence_map
+from flatland2d.scenes import FURNACE_ALBEDO
+from flatland2d.tone import decoded, encoded, exposure, tone, untone
+from restir_ref.batch import take
+from restir_ref.transport import record
+from restir_ref.transport.paths import RECONNECTION, Tracer, leaves, radiance, trace
+from tests.core.stubs import live
+from tests.transport.paths import HYBRID, RULES
+
+every_scene = pytest.mark.parametrize("scene", SCENES)
+L = np.geomspace(1e-6, 1e6, 200)
+
+# ---------------------------------------------------------------- tone
+
+
+@pytest.mark.parametrize("e", [0.01, 1.0, 30.0])
+def test_tone_mapping_loses_nothing(e):
+    t = tone(L, e)
+    assert np.all(np.diff(t) > 0)
+    assert 0 < t.min() < t.max() < 1
+    np.testing.assert_allclose(untone(t, e)[t < 0.999], L[t < 0.999], rtol=1e-9)
+
+
+def test_clipping_would_lose_the_bright_end():
+    clipped = encoded(np.minimum(L, 1))
+    assert abs(decoded(clipped) / L - 1).max() > 0.9
+
+
+def test_exposure_puts_its_percentile_at_half_the_light():
+    lit = np.append(np.zeros(50), L)
+    assert tone(np.percentile(L, 90), exposure(lit, 90)) == pytest.approx(encoded(np.array(0.5)))
+    assert exposure(np.zeros(3)) == 1
+    assert encoded(np.array(0.5)) == pytest.approx(0.7354, abs=1e-4)
+
+
+def test_the_curve_of_screens_has_no_step_at_its_knee():
+    below, above = encoded(np.array([0.0031308, 0.0031309]))
+    assert above - below == pytest.approx(12.92e-7, abs=1e-7)
+
+
+# ---------------------------------------------------------------- what is on an axis
+
+
+def drawn(draw, *args):
+    """The axis that a picture function has drawn on."""
+    with style.context():
+        ax = Figure().subplots()
+        draw(ax, *args)
+    return ax
+
+
+def pieces(ax):
+    """Segments of all line collections, by label."""
+    return {str(c.get_label()): c.get_segments() for c in ax.collections if hasattr(c, "get_segments")}
+
+
+@every_scene
+def test_a_scene_picture_has_every_segment_circle_and_light(scene):
+    setting = SCENES[scene]()
+    ax = drawn(pictures.scene_picture, setting)
+    surfaces = [c for c in ax.collections if " r ." in str(c.get_label()) or str(c.get_label()).split(" ")[0] in WORDS]
+    assert sum(len(c.get_segments()) for c in surfaces) == setting.scene.S + setting.scene.radii.size
+    lamps = len(setting.scene.lights.upto)
+    words = [text.get_text() for text in ax.texts]
+    assert words == (["light"] * lamps if lamps <= 4 else [f"{lamps} lights"])
+    assert [c.get_offsets().tolist() for c in ax.collections if c.get_label() == "eye"] == [[list(setting.eye)]]
+    assert (ax.get_aspect(), bool(ax.get_xlabel() and ax.get_ylabel())) == (1.0, True)
+
+
+WORDS = ("lambert", "ggx", "glass")
+
+
+def test_the_wedge_is_what_the_inset_sees():
+    setting = SCENES["glass_disc"]()
+    ax = drawn(pictures.scene_picture, setting, 16)
+    (wedge,) = ax.patches
+    corners, sensor = wedge.get_xy(), setting.pinhole(16)
+    x, w, _ = sensor.ray(np.arange(16), np.full((1, 16), 0.5))
+    to = corners[1:17].T - x
+    np.testing.assert_allclose(to / np.linalg.norm(to, axis=0), w, atol=1e-12)
+
+
+def test_materials_differ_without_colour():
+    dashes = [str(look["ls"]) for look in pictures.MATERIALS]
+    assert len(set(dashes)) == len(dashes)
+
+
+def test_materials_are_named_by_their_lobes():
+    scene = SCENES["glossy_cornell"]().scene
+    assert pictures.material_in_words(scene, 1) == "lambert + ggx r .15"
+    assert pictures.material_in_words(SCENES["glass_disc"]().scene, 1) == "glass reflection + glass transmission"
+
+
+# ---------------------------------------------------------------- bundles
+
+
+def bundle(scene, N=50):
+    """A tracer of the whole film, primary samples, and pixels."""
+    t, rng = flat_scenes.whole_film(scene), np.random.default_rng(1)
+    return t, rng.random((t.D, N)), rng.integers(0, t.sensor.n, N)
+
+
+@every_scene
+def test_a_bundle_carries_the_light_of_its_trees_from_vertex_to_vertex(scene):
+    t, u, pixel = bundle(scene)
+    ends, carried = pictures.strands(t, u, pixel)
+    light = carried.reshape(-1, len(pixel))
+    to_light, onwards = light[1::2], light[::2]  # by falling index of the vertex
+    at_end = {(k, nee): F.mean(axis=0) for k, nee, F in leaves(trace(t, u, pixel))}
+    np.testing.assert_allclose(onwards[-1], radiance(trace(t, u, pixel)).mean(axis=0), rtol=1e-12)
+    for k in range(t.depth):
+        i = t.depth - 1 - k
+        np.testing.assert_allclose(onwards[k + 1], onwards[k] + to_light[k] + at_end[i, False], rtol=1e-12)
+    start = ends[-len(pixel) :, 0]
+    np.testing.assert_array_equal(start, np.broadcast_to(SCENES[scene]().eye, start.shape))
+
+
+def test_a_bundle_draws_only_pieces_that_carry_light():
+    t, u, pixel = bundle("ajar")
+    _, carried = pictures.strands(t, u, pixel)
+    ax = drawn(pictures.bundle_picture, SCENES["ajar"](), t, u, pixel)
+    assert 0 < len(ax.collections[0].get_segments()) == (carried > 0).sum() < carried.size
+
+
+# ---------------------------------------------------------------- fluence
+
+
+def z_and_error(differences, scale):
+    error = differences.std() / np.sqrt(differences.size)
+    return differences.mean() / error, error / scale
+
+
+def small_map(scene, N=16 * 1500):
+    """A tracer of 4 x 4 places, N primary samples, and their pixels."""
+    setting = SCENES[scene]()
+    t = Tracer(setting.scene, setting.fluence(4, 4), setting.depth, RECONNECTION)
+    return t, np.random.default_rng(1).random((t.D, N)), np.arange(N) % 16
+
+
+@pytest.mark.parametrize("scene", ["cornell", "ajar", "rack", "clear_coat", "furnace"])
+def test_fluence_is_radiance_over_all_directions(scene):
+    t, u, pixel = small_map(scene)
+    F, plain = fluence(t, u, pixel)[0], radiance(trace(t, u, pixel))[0]
+    z, error = z_and_error(F - plain, plain.mean())
+    assert error < 0.011
+    assert abs(z) < 4
+
+
+def test_counting_direct_light_twice_is_noticed():
+    t, u, pixel = small_map("cornell")
+    tree = trace(t, u, pixel)
+    twice = fluence(t, u, pixel)[0] + direct(t, tree, pixel)[0]
+    z, error = z_and_error(twice - radiance(tree)[0], twice.mean())
+    assert error < 0.011
+    assert z > 8
+
+
+def test_a_furnace_is_evenly_filled():
+    bounces = SCENES["furnace"]().depth
+    truth = 2 * np.pi * (1 - FURNACE_ALBEDO ** (bounces + 1)) / (1 - FURNACE_ALBEDO)
+    values = fluence_map(SCENES["furnace"](), 8, 8, 32, live())
+    z, error = z_and_error(values - truth, truth)
+    assert error < 0.004
+    assert abs(z) < 4
+    assert abs(values / truth - 1).max() < 0.15
+
+
+def test_the_scale_of_a_map_is_in_fluence():
+    setting, values = SCENES["ajar"](), np.geomspace(0.01, 300, 32).reshape(4, 8)
+    with style.context():
+        ax = Figure().subplots()
+        bar = pictures.fluence_picture(ax, setting, values)
+    shown = ax.images[0].norm(values)
+    assert (bar.vmin, bar.vmax) == (0, 300)
+    assert np.all(np.diff(np.asarray(shown).ravel()) > 0)
+    assert np.asarray(shown).max() == pytest.approx(1)
+    assert ax.images[0].get_extent() == [0, 2, 0, 1]
+    assert "rad" in bar.ax.get_ylabel()
+
+
+@pytest.mark.parametrize("top", [0.02, 1.0, 37.0, 4e4])
+def test_ticks_are_round_and_on_the_scale(top):
+    ticks = pictures.fluence_ticks(3 / top, top)
+    assert 4 <= len(ticks) <= 6
+    assert (ticks[0], bool(ticks[-1] <= top)) == (0, True)
+    assert all(re.fullmatch(r"[\d.]5?0*(e[+-]\d+)?", f"{2 * tick:.3g}") or len(f"{tick:.2g}") <= 6 for tick in ticks)
+
+
+# ---------------------------------------------------------------- shifts
+
+
+def lit_pairs(scene, rule, N=60, reach=60):
+    """Random paths with light and their offset paths, one by one."""
+    t, u, i = bundle(scene, N)
+    t = Tracer(t.scene, t.sensor, t.depth, RULES[rule])
+    rng = np.random.default_rng(2)
+    x = shift_pictures.leaf_path(t, u, i, rng.integers(1, t.depth + 1, N), rng.random(N) < 0.5)
+    j = np.clip(i + reach, 0, t.sensor.n - 1)
+    return [
+        shift_pictures.pair(t, take(x, np.array([n])), int(i[n]), int(j[n])) for n in np.flatnonzero(x.F.any(axis=0))
+    ]
+
+
+def sees(p, a, b):
+    return bool(p.t.scene.visible(a, b)[0])
+
+
+REASONS = {
+    r"the replay is lost after \$y_\d\$": lambda p, last: not p.y.seen[:last].all(),
+    r"\$y\$ would reconnect at \d": lambda p, last: p.t.rule.roughness < np.inf,
+    r"\$y\$ cannot reconnect there": lambda p, last: p.c > 0,
+    r"something stands between .*": lambda p, last: not sees(p, p.y.x[last], p.x.x[p.c]),
+    r"its light is hidden": lambda p, last: not sees(p, p.y.x[last], p.y.x[last + 1]),
+    r"no lobe leads there": lambda p, last: p.c > 0 and sees(p, p.y.x[last], p.x.x[p.c]),
+}
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("scene", ["glossy_cornell", "occluders", "glass_disc"])
+def test_an_undefined_shift_has_a_true_reason(scene, rule):
+    found = lit_pairs(scene, rule)
+    undefined = [p for p in found if p.J == 0]
+    assert len(found) > 5
+    for p in undefined:
+        (holds,) = [true for words, true in REASONS.items() if re.fullmatch(words, shift_pictures.why_undefined(p))]
+        assert holds(p, p.c - 1 if p.c else int(p.y.k[0]))
+    assert all("$J$ = 0, " in shift_pictures.pair_in_words(p) for p in undefined)
+    assert all("hat p" in shift_pictures.pair_in_words(p) for p in found if p.J > 0)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_shift_picture_shows_the_vertices_of_both_paths(rule):
+    t = gris_f05.tracer(RULES[rule])
+    p = shift_pictures.pair(t, gris_f05.by_hand(t, 4), gris_f05.PIXEL, gris_f05.PIXEL + 60)
+    ax = drawn(shift_pictures.shift_picture, gris_f05.corridor(), p)
+    lines = {line.get_label(): line.get_xydata() for line in ax.lines}
+    np.testing.assert_array_equal(lines["base path"], p.x.x[:, :, 0])
+    end = p.c or len(p.y.x)
+    np.testing.assert_array_equal(lines["offset path, replayed"], p.y.x[:end, :, 0])
+    assert ("reconnection" in lines) == (p.c > 0)
+    if p.c:
+        np.testing.assert_array_equal(lines["reconnection"][1], p.x.x[p.c, :, 0])
+    names = {text.get_text() for text in ax.texts} - {"light"}
+    assert (f"$x_{p.c} = y_{p.c}$" in names) == (p.c > 0)
+    assert {"$x_1$", "$y_1$"} <= names
+
+
+def test_full_vertices_are_the_rough_ones():
+    t = gris_f05.tracer(HYBRID)
+    p = shift_pictures.pair(t, gris_f05.by_hand(t, 4), gris_f05.PIXEL, gris_f05.PIXEL + 60)
+    ax = drawn(shift_pictures.shift_picture, gris_f05.corridor(), p)
+    full = {tuple(c.get_offsets()[0]): c.get_facecolor()[0].tolist() != [1, 1, 1, 1] for c in marks(ax)}
+    assert [full[tuple(x)] for x in p.x.x[1:5, :, 0]] == [False, False, True, True]
+
+
+def marks(ax):
+    return [c for c in ax.collections if len(c.get_offsets()) == 1 and c.get_label() != "eye" and c.get_zorder() == 4]
+
+
+# ---------------------------------------------------------------- figures
+
+
+def made(figure, preset):
+    chunks = figure.chunks(preset)
+    return figure.combine(preset, [figure.compute(preset, c, rng=np.random.default_rng(1)) for c in chunks])
+
+
+@pytest.mark.claims("GRIS-F05")
+def test_hybrid_reconnects_the_hand_built_path_at_four():
+    arrays = made(gris_f05.FIGURE, {"paths": 400})
+    assert {verdict_of(claim) for claim in gris_f05.check(arrays)} == {"reproduced"}
+    assert undeclared(gris_f05.FIGURE, gris_f05.check(arrays)) == ""
+    assert arrays["index"].tolist() == [[4, 4], [2, 2], [0, 0]]
+    assert len(set(arrays["found"])) > 2
+
+
+def far_end_only(rule, r_x, r_z, distance):
+    """A mistake: only the vertex to be connected to is tested, not the one before it."""
+    return (r_z >= rule.roughness) & (distance >= rule.distance)
+
+
+def test_testing_one_vertex_of_the_pair_is_noticed(monkeypatch):
+    monkeypatch.setattr(record, "connectable", far_end_only)
+    t = gris_f05.tracer(HYBRID)
+    assert gris_f05.by_hand(t, 4).c == 3
+    found, counted = gris_f05.indices(400, live())
+    assert (found != counted).any()
+
+
+def test_the_hand_built_path_goes_where_it_should():
+    t = gris_f05.tracer(HYBRID)
+    p = shift_pictures.pair(t, gris_f05.by_hand(t, 5), gris_f05.PIXEL, gris_f05.PIXEL)
+    np.testing.assert_allclose(p.x.x[2:6, :, 0], gris_f05.POINTS[1:], atol=1e-12)
+    assert (p.J, p.gain) == pytest.approx((1, 1), rel=1e-12)
+
+
+def test_the_gallery_has_a_bundle_and_a_map_of_every_scene():
+    arrays = made(flat_scenes.FIGURE, {"rows": 4, "samples": 1, "paths": 3})
+    assert {name.split(" ")[0] for name in arrays} == set(SCENES)
+    assert arrays["ajar fluence"].shape == (4, 8)
+    with style.context():
+        panels = Figure().subplots(1, 2)
+        flat_scenes.draw_scene(panels, "ajar", {k.split(" ")[1]: v for k, v in arrays.items() if k.startswith("ajar")})
+    assert all(ax.get_xlabel() and ax.get_ylabel() for ax in panels)
+    assert flat_scenes.sentence("ajar").startswith("ajar, FS3: two rooms")

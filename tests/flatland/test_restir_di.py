@@ -1,0 +1,127 @@
+"""ReSTIR DI against quadrature over the lights: weights that see obstacles are right, 1/M is dark at shadows' edges."""
+
+import numpy as np
+import pytest
+
+from figures.criteria import all_unbiased, biased, mean_and_blocks, unbiased
+from flatland2d import SCENES
+from flatland2d.radiosity import cut, gather
+from restir_ref.batch import Array, take
+from restir_ref.chance import Live
+from restir_ref.integrals import Pixels
+from restir_ref.loop import random_in_row
+from restir_ref.mis import Weights
+from restir_ref.restir import initial, shade
+from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit, leaves, trace
+from restir_ref.transport.restir_di import (
+    BIASED,
+    CANDIDATES,
+    DEBIASED,
+    LightIntegrals,
+    direct_light,
+    indirect_light,
+    light_integrals,
+    lit,
+)
+from tests.flatland.truths import radiosity
+
+PIXELS, REPLICAS, FRAMES, RADIUS = 128, 32, 3, 20
+CENTRE = 0.5
+
+
+def tracer(scene: str, n: int = PIXELS) -> Tracer:
+    """The scene's inset."""
+    setting = SCENES[scene]()
+    return Tracer(setting.scene, setting.pinhole(n), setting.depth, RECONNECTION)
+
+
+def quadrature(t: Tracer) -> Array:
+    """Direct light at the pixels' centres, from 32 panels per lamp."""
+    v, _, _ = first_hit(t, np.full((1, t.sensor.n), CENTRE), np.arange(t.sensor.n))
+    panels = cut(t.scene, 32)
+    lamps = take(panels, np.flatnonzero(panels.emission > 0))
+    return gather(t.scene, lamps, lamps.emission, v.x, v.prim, v.n)
+
+
+def shadow_edges(t: Tracer) -> Array:
+    """The quarter of the pixels that differ most from those nearby in which lamps they see."""
+    v, _, _ = first_hit(t, np.full((1, t.sensor.n), CENTRE), np.arange(t.sensor.n))
+    lamps = t.scene.lights.corners.mean(axis=0)
+    sees = np.array([t.scene.visible(v.x, np.broadcast_to(lamp[:, None], v.x.shape)) for lamp in lamps.T])
+    near = [sees[:, max(i - RADIUS, 0) : i + RADIUS + 1] for i in range(t.sensor.n)]
+    change = np.array([(sees[:, i : i + 1] != each).mean() for i, each in enumerate(near)])
+    return np.asarray(change >= np.quantile(change, 0.75))
+
+
+def images(t: Tracer, mis: Weights, batches: int) -> Array:
+    """The last of some frames with temporal and spatial reuse, (replicas, pixels)."""
+    chance, index, found = Live(np.random.default_rng(1)), np.arange(REPLICAS * t.sensor.n), []
+    for _ in range(batches):
+        of = light_integrals(t, np.full((1, len(index)), CENTRE), index % t.sensor.n)
+        here, X, before = Pixels(of, index), None, []
+        for _ in range(FRAMES):
+            X = direct_light(here, random_in_row(of, index, 3, RADIUS, chance), mis, chance, X, before)
+            before = [here]
+        found.append(shade(X, here)[0].reshape(REPLICAS, -1))
+    return np.concatenate(found)
+
+
+@pytest.mark.claims("COM-B04")
+@pytest.mark.parametrize("name", DEBIASED)
+def test_restir_di_whose_weights_see_obstacles_is_unbiased(name) -> None:
+    t = tracer("many_lights")
+    estimates, truth = images(t, DEBIASED[name], 6), quadrature(t)
+    assert all_unbiased(mean_and_blocks(estimates), mean_and_blocks(truth), eps=0.02).passed
+    edges = shadow_edges(t)
+    assert unbiased(estimates[:, edges].mean(axis=1), truth[edges].mean(), eps=0.02).passed
+
+
+@pytest.mark.claims("COM-B04")
+def test_restir_di_that_counts_all_inputs_is_too_dark_at_the_edges_of_shadows() -> None:
+    t = tracer("many_lights")
+    estimates, truth, edges = images(t, BIASED, 4), quadrature(t), shadow_edges(t)
+    assert biased(estimates[:, edges].mean(axis=1), truth[edges].mean(), -0.5, -0.01).passed
+    assert estimates[:, edges].mean() / truth[edges].mean() < estimates.mean() / truth.mean()
+
+
+def test_candidates_alone_are_unbiased_without_any_weights() -> None:
+    """Before anything is shared there is nothing to debias: the error is in the weights."""
+    t, index = tracer("many_lights"), np.arange(4 * REPLICAS * PIXELS)
+    here = Pixels(light_integrals(t, np.full((1, len(index)), CENTRE), index % PIXELS), index)
+    X = lit(initial(here, Live(np.random.default_rng(2)), CANDIDATES), here)
+    assert unbiased(shade(X, here)[0].reshape(-1, PIXELS).mean(axis=1), quadrature(t).mean(), eps=0.02).passed
+    assert (X.c == 1).all()
+    assert (X.W == 0).any()
+
+
+def whole_images(t: Tracer, chance: Live) -> tuple[Array, Array]:
+    """(C, N) with ReSTIR DI at x_1, and by path tracing alone: direct light only."""
+    index = np.arange(REPLICAS * t.sensor.n)
+    tree = trace(t, chance.uniform((t.D, len(index))), index % t.sensor.n)
+    of = LightIntegrals(t.scene, t.sensor.n, tree.x[0], tree.T[0])
+    here = Pixels(of, index)
+    near = random_in_row(of, index, 3, RADIUS, chance)
+    ours = shade(direct_light(here, near, DEBIASED["talbot"], chance), here) + indirect_light(tree)
+    return ours, np.asarray(sum(F for _, _, F in leaves(tree)))
+
+
+@pytest.mark.claims("COM-B08")
+def test_path_tracing_with_restir_di_agrees_with_radiosity() -> None:
+    t = tracer("matte_cornell", 32)
+    truth = radiosity("matte_cornell", 32, (44, 52, 60, 68))
+    chance = Live(np.random.default_rng(3))
+    ours = np.concatenate([whole_images(t, chance)[0][0].reshape(REPLICAS, -1).mean(axis=1) for _ in range(12)])
+    assert unbiased(ours, truth, eps=0.02).passed
+
+
+@pytest.mark.claims("COM-B08")
+@pytest.mark.parametrize("scene", ["glossy_cornell", "clear_coat", "glass_disc"])
+def test_restir_di_stands_for_just_the_direct_light_of_path_tracing(scene) -> None:
+    setting, chance = SCENES[scene](), Live(np.random.default_rng(4))
+    t = Tracer(setting.scene, setting.fluence(8, 8), setting.depth, RECONNECTION)  # sees every surface
+    ours, alone = (
+        np.concatenate(each, axis=1)[0].reshape(-1, 64)
+        for each in zip(*(whole_images(t, chance) for _ in range(8)), strict=True)
+    )
+    truth = mean_and_blocks(alone).mean(axis=0)
+    assert all_unbiased(mean_and_blocks(ours - alone) + truth, truth, eps=0.02).passed

@@ -1,0 +1,131 @@
+"""What sees a wrong shift: round trips, re-tracing, finite differences, the change of variables, pixels, or the mean.
+
+For right shifts, and all functions h of paths y of pixel j,
+
+    E_x[p_hat_j(Tx) J W h(Tx)] = E_y[p_hat_j(y) W 1{T^-1 y defined} h(y)].
+
+h is Talbot's weight of x against y, which keeps both sides bounded, in bins of J, reconnection index and technique.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+
+from restir_ref.batch import Array, ratio, take
+from restir_ref.chance import Live
+from restir_ref.integrals import Pixels, shifted
+from restir_ref.loop import random_in_row
+from restir_ref.restir import initial
+from restir_ref.transport.paths import Path
+from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.transport.zoo import WRONG_SHIFTS
+from tests.flatland.renderings import REACH, bias, frames, images, last, paired, spread
+from tests.transport.paths import Shifts, finite_difference_jacobian, retraced
+
+REPLICAS = 1000
+EDGE_CASES = 1e-3
+"""Share of paths that floating point may decide differently there and back."""
+
+# ---------------------------------------------------------------- the change of variables
+
+STEPS = (1 / 1.3, 1, 1.3)
+"""Bins of J."""
+SIGMAS = 4.5
+"""About 30 bins: right shifts exceed it once in 5000 times."""
+
+
+def kinds(y: Path, J: Array) -> Array:
+    """A number for the bin of each path: J, reconnection index, length, technique; (N,)."""
+    return ((np.digitize(J, STEPS) * 8 + y.c) * 8 + y.k) * 2 + y.nee
+
+
+def sides(of: PathIntegrals, seed: int) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Values (N,) and bins (N,) of both sides of the identity, from independent initial samples of pixels i and j."""
+    chance = Live(np.random.default_rng(seed))
+    here = Pixels(of, np.arange(of.n * REPLICAS))
+    (there,) = random_in_row(of, here.index, 1, REACH, chance)
+    X, Y = (initial(Pixels(PathIntegrals(of.tracer), at.index), chance) for at in (here, there))
+    y, back = shifted(X.x, here, there), shifted(Y.x, there, here)
+    forth = harmonic(of.target(here.index, X.x), of.target(there.index, y.x) * y.J) * X.W
+    found = harmonic(of.target(there.index, Y.x), of.target(here.index, back.x) * back.J) * Y.W
+    return (forth, kinds(y.x, y.J)), (found, kinds(Y.x, ratio(np.ones(1), back.J)))
+
+
+def harmonic(p: Array, q: Array) -> Array:
+    """p q / (p + q)."""
+    return ratio(p * q, p + q)
+
+
+def z_scores(of: PathIntegrals, seed: int) -> Array:
+    """z of the difference in every bin with at least 30 values on one side."""
+    (a, kind_a), (b, kind_b) = sides(of, seed)
+    found = []
+    for kind in np.unique(np.concatenate([kind_a[a > 0], kind_b[b > 0]])):
+        left, right = a * (kind_a == kind), b * (kind_b == kind)
+        if max((left > 0).sum(), (right > 0).sum()) >= 30:
+            found.append((left.mean() - right.mean()) / np.sqrt((left.var() + right.var()) / len(left)))
+    return np.array(found)
+
+
+# ---------------------------------------------------------------- path by path
+
+
+def tried(of: PathIntegrals, N: int, seed: int) -> Shifts:
+    """Shifts of initial samples of random pixels that succeeded."""
+    chance = Live(np.random.default_rng(seed))
+    i = np.arange(N) % of.n
+    (there,) = random_in_row(of, i, 1, REACH, chance)
+    X = initial(Pixels(PathIntegrals(of.tracer), i), chance)
+    y = shifted(X.x, Pixels(of, i), there)
+    good = np.flatnonzero((y.J > 1e-12) & y.x.F.any(axis=0) & X.x.F.any(axis=0))  # J = 0 but for rounding: in a facet
+    return Shifts(of.tracer, take(X.x, good), i[good], take(y.x, good), there.index[good], y.J[good])
+
+
+def returns(of: PathIntegrals, seed: int) -> bool:
+    """Whether the way back exists, has the inverse Jacobian, and ends at the base path."""
+    s = tried(of, 20_000, seed)
+    back = of.shift(s.y, s.j, Pixels(of, s.i))
+    same = np.abs(back.J * s.J - 1) < 1e-6
+    same &= (np.abs(back.x.F - s.x.F) <= 1e-6 * s.x.F).all(axis=0)
+    return bool((~same).mean() <= EDGE_CASES)
+
+
+def is_traced(of: PathIntegrals, seed: int) -> bool:
+    """Whether tracing u^y from scratch finds the offset path, with what it carries, and where it reconnects."""
+    s = tried(of, 20_000, seed)
+    _, y = retraced(s)
+    same = (np.abs(y.F - s.y.F) <= 1e-6 * s.y.F).all(axis=0) & (y.c == s.y.c)
+    return bool((~same).mean() <= EDGE_CASES)
+
+
+def has_its_jacobian(of: PathIntegrals, seed: int) -> bool:
+    """Whether J is the determinant that finite differences of u^y give."""
+    s = tried(of, 4000, seed)
+    through = np.flatnonzero((s.x.c > 0) & (s.x.c < s.x.k))[:100]
+    s = Shifts(s.t, take(s.x, through), s.i[through], take(s.y, through), s.j[through], s.J[through])
+    measured, decided = finite_difference_jacobian(s)
+    return bool((np.abs(measured / s.J - 1)[decided] > 1e-4).mean() < 0.05)
+
+
+# ---------------------------------------------------------------- renderings
+
+
+@cache
+def rendered(of: PathIntegrals, seed: int) -> tuple[float, float]:
+    """Spread of the pixels' z-scores after two rounds of spatial reuse, and z of the image's mean."""
+    image = paired(last(frames([of], REPLICAS, Live(np.random.default_rng(seed)), ("spatial", "spatial"))))
+    return spread(image.added), bias(image.added, image.initial).z
+
+
+LARGEST_SPREAD = 1.7
+
+CHECKS = {
+    "round trip": lambda of: returns(of, 1),
+    "re-tracing": lambda of: is_traced(of, 2),
+    "finite differences": lambda of: has_its_jacobian(of, 3),
+    "change of variables": lambda of: np.abs(z_scores(of, 4)).max() < SIGMAS,
+    "pixel by pixel": lambda of: rendered(of, 5)[0] < LARGEST_SPREAD,
+    "mean of the image": lambda of: abs(rendered(of, 5)[1]) < 4,
+}
