@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from flatland2d import SCENES
 from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
-from restir_ref.integrals import Pixels, Reservoirs
-from restir_ref.loop import OFFLINE, REAL_TIME, Preset, frame, random_in_row, spread_in_row
+from restir_ref.integrals import Image, Pixels, Reservoirs
+from restir_ref.loop import OFFLINE, REAL_TIME, Around, Preset, frame, random_in_row, spread_in_row
 from restir_ref.restir import shade
 from restir_ref.transport.counting import counted, rays
 from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer, radiance, trace
@@ -33,7 +34,16 @@ COLUMNS = 2**14
 Renderer = Callable[[PathIntegrals, Array, Chance], Array]
 """(image, columns, chance) -> one estimate per column, grey, (N,)."""
 
-Sources = Callable[[PathIntegrals, PathIntegrals], Array]
+
+class Traced(Image, Protocol):
+    """An image of traced paths, whatever its shifts keep."""
+
+    @property
+    def tracer(self) -> Tracer:
+        """Scene, sensor, depth and rule."""
+
+
+Sources = Callable[[Traced, Traced], Array]
 """Motion vectors: (this frame, the previous one) -> the previous frame's pixel of every pixel, (n,)."""
 
 
@@ -69,12 +79,12 @@ def path_tracing(samples: int) -> Renderer:
     return render
 
 
-def spatial_only(preset: Preset) -> Renderer:
-    """One frame of a preset without history, its neighbours from a low-discrepancy sequence."""
+def spatial_only(preset: Preset, around: Around = spread_in_row) -> Renderer:
+    """One frame of a preset without history, its neighbours from a low-discrepancy sequence unless told otherwise."""
 
     def render(of: PathIntegrals, index: Array, chance: Chance) -> Array:
         here = Pixels(of, index)
-        return np.asarray(shade(frame(here, chance, preset, spread_in_row), here).mean(axis=0))
+        return np.asarray(shade(frame(here, chance, preset, around), here).mean(axis=0))
 
     return render
 
@@ -97,7 +107,7 @@ def means(images: Array, T: int) -> Array:
 
 
 def film(
-    views: Sequence[PathIntegrals],
+    views: Sequence[Traced],
     replicas: int,
     chance: Chance,
     preset: Preset = REAL_TIME,

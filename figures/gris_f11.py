@@ -27,24 +27,31 @@ def errors(a: Arrays, scene: str, images: Array) -> Array:
     return rel_mse(images, a[f"{scene}.reference"])
 
 
-def ratio(a: Arrays, scene: str, T: int, trees: float, method: str, limit: float) -> criteria.Outcome:
-    """relMSE of T frames of a method over that of path tracing with so many trees."""
-    ours, theirs = (errors(a, scene, x) for x in (offline.after(a, scene, method, T), offline.traced(a, scene, trees)))
-    return criteria.ratio_below(*offline.paired(ours, theirs), limit)
+def against_tracing(a: Arrays, T: int, method: str) -> Claim:
+    """relMSE of T frames of a method over that of as many path trees, with rough boxes."""
+    images = offline.after(a, "cornell", method, T), offline.traced(a, "cornell", offline.equal_samples(T))
+    pair = offline.paired(*(errors(a, "cornell", each) for each in images))
+    worse = criteria.ratio_above(*pair, 1)
+    part = f"{method} / path tracing, {T} frames, equal samples"
+    return Claim("GRIS-F11a", criteria.ratio_below(*pair, 0.5), part, counter=worse, reason=REASON)
+
+
+REASON = (
+    "The mean is that of the dozen pixels beside the edge of the box, where neighbours see other surfaces: what one "
+    "path of each of seven pixels tells is noisier there than the pixel's own 32 trees. In this easy scene those leave "
+    "9% error; elsewhere reuse helps (right panel). It also helps where one tree is all there is, and behind the slit "
+    "(GRIS-F01, F17)."
+)
 
 
 def check(a: Arrays) -> list[Claim]:
     """At one frame and at the longest mean that leaves eight groups, at equal samples; equal rays beside it."""
     claims = []
     for T in (1, longest(a)):
-        for method in METHODS[1:]:
-            part = f"{method} / path tracing, {T} frames"
-            equal = ratio(a, "cornell", T, offline.equal_samples(T), method, 0.5)
-            claims.append(Claim("GRIS-F11a", equal, f"{part}, equal samples"))
+        claims += [against_tracing(a, T, method) for method in METHODS[1:]]
         hybrid, other = (errors(a, "cornell", offline.after(a, "cornell", m, T)) for m in ("hybrid", "reconnection"))
-        claims.append(
-            Claim("GRIS-F11a", criteria.between(hybrid.mean() / other.mean(), 0.7, 1.3), f"hybrid / reconnection, {T}")
-        )
+        alike = criteria.between(hybrid.mean() / other.mean(), 0.7, 1.3)
+        claims.append(Claim("GRIS-F11a", alike, f"hybrid / reconnection, {T} frames", reason=REASON))
         glossy = {m: errors(a, "glossy_cornell", offline.after(a, "glossy_cornell", m, T)) for m in METHODS[1:]}
         better = criteria.ratio_below(glossy["hybrid"], glossy["reconnection"], 0.85)
         claims.append(Claim("GRIS-F11b", better, f"hybrid / reconnection, {T} frames"))
@@ -57,10 +64,10 @@ def longest(a: Arrays) -> int:
 
 
 def draw(a: Arrays) -> "Picture":
-    """relMSE over frames; path tracing at equal samples, rays and time."""
-    picture, axes = style.panels(1, 2, width=4.0, height=3.2)
+    """relMSE over frames; path tracing at equal samples, rays and time; error by pixel."""
+    picture, axes = style.panels(1, 3, width=3.9, height=3.3)
     T = 2 ** np.arange(int(np.log2(longest(a))) + 1)
-    for axis, (scene, title) in zip(axes[0], SCENES.items(), strict=True):
+    for axis, (scene, title) in zip(axes[0, :2], SCENES.items(), strict=True):
         prices: dict[str, Callable[[int], float]] = {
             "equal samples": offline.equal_samples,
             "equal rays": partial(offline.equal_rays, a, scene, "hybrid"),
@@ -72,8 +79,23 @@ def draw(a: Arrays) -> "Picture":
         for method in METHODS[1:]:
             axis.loglog(T, [errors(a, scene, offline.after(a, scene, method, int(t))).mean() for t in T], label=method)
         axis.set(xlabel="frames T in the mean", ylabel="relMSE of the mean", title=title)
-        axis.legend()
+        axis.legend(fontsize=6.5)
+    by_pixel(a, axes[0, 2])
     return picture
+
+
+def by_pixel(a: Arrays, axis: Any) -> None:
+    """Relative squared error of one frame along the inset with rough boxes."""
+    truth = a["cornell.reference"]
+    shown = {
+        "path tracing, equal samples": offline.traced(a, "cornell", offline.equal_samples(1)),
+        **{method: offline.after(a, "cornell", method, 1) for method in METHODS[1:]},
+    }
+    for name, images in shown.items():
+        error = ((images / truth - 1) ** 2).mean(axis=0)
+        axis.semilogy(error.reshape(-1, 4).mean(axis=1).repeat(4), label=name)
+    axis.set(xlabel="pixel of the inset", ylabel="relative squared error", title="One frame, rough boxes")
+    axis.legend(fontsize=6.5)
 
 
 def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:

@@ -89,15 +89,20 @@ def check(a: Arrays) -> list[Claim]:
     """Per lobe against both numbers: noise and replayed vertices."""
     claims = []
     for other in ("averaged", "glossiest"):
-        noise, length = (
-            [values(a, method) for method in ("per lobe", other)]
-            for values in (errors, lambda a, method: a[f"{SCENE}.{method}.replayed"])
-        )
-        claims.append(Claim("GRIS-F12", criteria.ratio_below(noise[0], noise[1], 0.9), f"relMSE, per lobe / {other}"))
-        claims.append(
-            Claim("GRIS-F12", criteria.ratio_below(length[0], length[1], 0.9), f"replayed, per lobe / {other}")
-        )
+        noise = errors(a, "per lobe"), errors(a, other)
+        length = a[f"{SCENE}.per lobe.replayed"], a[f"{SCENE}.{other}.replayed"]
+        for part, pair in (("relMSE", noise), ("replayed vertices", length)):
+            less, more = criteria.ratio_below(*pair, 0.9), criteria.ratio_above(*pair, 1)
+            why = "" if less.passed else REASONS[other]
+            claims.append(Claim("GRIS-F12", less, f"{part}, per lobe / {other}", counter=more, reason=why))
     return claims
+
+
+REASONS = {
+    "averaged": "The average is rough, so that everything reconnects: nothing is replayed, and the coat, whose light "
+    "is a distant lamp, does better with it, as in GRIS-F13b.",
+    "glossiest": "The whole floor replays: paths are longer, but replaying the matte base costs little noise here.",
+}
 
 
 def errors(a: Arrays, method: str) -> Array:

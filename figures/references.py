@@ -63,12 +63,12 @@ def stored_at(path: Path) -> Arrays:
 
 
 def save(references: Mapping[str, Reference], path: Path = PATH) -> None:
-    """Write references of today's scenes into the file, in one step; a longer one of the same scene stays."""
+    """Write references of today's scenes into the file, in one step; one that is better stays."""
     arrays = stored_at(path)
     for name, each in references.items():
         scene = fingerprint(SCENES[name]())
-        longer = arrays.get(f"{name}.samples", -1) > each.samples
-        if not (longer and str(arrays[f"{name}.scene"]) == scene):
+        stays = str(arrays.get(f"{name}.scene")) == scene and arrays[f"{name}.image_error"] < each.image_error
+        if not stays:
             values: dict[str, Any] = {**vars(each), "scene": scene}
             arrays |= {f"{name}.{field}": np.asarray(value) for field, value in values.items()}
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -36,8 +36,17 @@ MODULES: tuple[str, ...] = (
     "figures.gris_e40",
     "figures.gris_e41",
     "figures.gris_c15",
+    "figures.gris_c10",
+    "figures.gris_c09",
+    "figures.gris_f17",
+    "figures.gris_f13",
+    "figures.gris_f12",
+    "figures.gris_f11",
+    "figures.gris_f07flat",
     "figures.gris_f05",
     "figures.flat_scenes",
+    "figures.gris_f14",
+    "figures.gris_f15di",
 )
 ROOT = Path(__file__).resolve().parent.parent
 ID = re.compile(r"[A-Z][A-Z0-9]*-[A-Za-z0-9-]+")

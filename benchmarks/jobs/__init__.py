@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from benchmarks.jobs import extremes, references, retracing, roundtrips
+from benchmarks.jobs import extremes, means, references, retracing, roundtrips
 from benchmarks.jobs.job import Done, Job
 
 JOBS: Mapping[str, Job] = MappingProxyType(
@@ -13,6 +13,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "round trips": roundtrips.JOB,
         "re-tracing": retracing.JOB,
         "extremes": extremes.JOB,
+        "means": means.JOB,
     }
 )
 PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType({"references": references.publish})

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.jobs.comparing import Truth, joined, judged, nothing, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from figures.figure import Arrays
-from figures.references import Reference, reference
+from figures.references import reference
 from flatland2d.motion import motion, sources
 from flatland2d.scenes import INSET, SCENES
 from restir_ref.batch import Array
@@ -29,8 +30,6 @@ from tests.transport.paths import RULES
 CHUNKS, REPLICAS = {"cornell": 32, "glossy_cornell": 64, "ajar": 320, "clear_coat": 64}, 64
 """Chunks by scene, of 64 replicas of 128 pixels: 2048 to 20 480, as much as 0.5% takes."""
 SHIFTS = ("hybrid", "reconnection")
-BLOCKS = 8
-EPS, SIGMA, SPREAD = 0.005, 4.0, 1.3
 
 
 @dataclass(frozen=True)
@@ -81,13 +80,16 @@ def came_from(now: PathIntegrals, before: PathIntegrals, index: Array) -> Pixels
 
 
 def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
-    """Of what reuse adds, and of the result: block means (2, REPLICAS, BLOCKS), sums over replicas (2, n)."""
+    """What reuse adds to initial samples, and the result."""
     mode = MODES[params["mode"]]
     images = views(params["scene"], params["rule"], mode)
-    result, initial_ = last_frame(images, mode.rounds, np.arange(REPLICAS * INSET), Live(rng))
-    values = np.stack([result - initial_, result]).reshape(2, REPLICAS, INSET)
-    blocks = values.reshape(2, REPLICAS, BLOCKS, -1).mean(axis=-1)
-    return {"blocks": blocks, "sums": values.sum(axis=1), "squares": (values**2).sum(axis=1)}
+    result, own = (each.reshape(REPLICAS, INSET) for each in last_frame(images, mode.rounds, columns(), Live(rng)))
+    return stored(sums(result - own), "added") | stored(sums(result), "result")
+
+
+def columns() -> Array:
+    """All pixels of all replicas."""
+    return np.arange(REPLICAS * INSET)
 
 
 def chunks(share: float) -> Sequence[Params]:
@@ -97,59 +99,21 @@ def chunks(share: float) -> Sequence[Params]:
     return [{"scene": scene, **case, "part": part} for part, scene in sorted(every) for case in cases]
 
 
-# ---------------------------------------------------------------- verdicts
-
-
-def z_and_error(samples: Array, truth: float, truth_error: float) -> tuple[float, float]:
-    """z of a mean over replicas against the truth, and its standard error with the truth's."""
-    error = np.hypot(samples.std(ddof=1) / np.sqrt(len(samples)), truth_error)
-    return float((samples.mean() - truth) / error), float(error)
-
-
-def spread(total: Array, square: Array, n: int, truth: Array | float, truth_error: Array | float) -> float:
-    """Root mean square of the pixels' z-scores; sums over n replicas, (pixels,)."""
-    mean = total / n
-    error = np.hypot(np.sqrt((square / n - mean**2) / (n - 1)), truth_error)
-    return float(np.sqrt(np.mean(((mean - truth) / error) ** 2)))
-
-
 def judge(done: Done) -> Sequence[Row]:
     """Every case by both comparisons."""
-    rows: list[Row] = []
+    rows = []
     for case in dict.fromkeys((params["scene"], params["rule"], params["mode"]) for params, _ in done):
         mine = [arrays for params, arrays in done if (params["scene"], params["rule"], params["mode"]) == case]
-        blocks = np.concatenate([arrays["blocks"] for arrays in mine], axis=1)
-        sums, squares = (np.sum([arrays[name] for arrays in mine], axis=0) for name in ("sums", "squares"))
-        truth, n = reference(case[0]), blocks.shape[1]
-        spreads = [
-            spread(sums[0], squares[0], n, 0.0, 0.0),
-            spread(sums[1], squares[1], n, truth.mean, truth.error),
+        truth, where = reference(case[0]), ", ".join(case)
+        scale = float(truth.mean.mean())
+        exact = Truth(truth.mean, truth.error, truth.image_error)
+        added, result = joined(mine, "added"), joined(mine, "result")
+        rows += [
+            judged(CLAIMS, f"{where}: bias against the frames' own initial samples", added, nothing(INSET), scale, EPS),
+            judged(CLAIMS, f"{where}: bias against the reference", result, exact, scale, EPS),
         ]
-        rows += judged(", ".join(case), blocks, truth, spreads)
     return rows
 
 
-def judged(case: str, blocks: Array, truth: Reference, spreads: Sequence[float]) -> list[Row]:
-    """One case: the paired comparison, and the one with the reference."""
-    by_block = truth.mean.reshape(BLOCKS, -1)
-    error_by_block = np.sqrt((truth.error.reshape(BLOCKS, -1) ** 2).sum(axis=1)) / by_block.shape[1]
-    zero = (np.zeros(BLOCKS), np.zeros(BLOCKS), 0.0)
-    against = {
-        "against the frames' own initial samples": zero,
-        "against the reference": (by_block.mean(axis=1), error_by_block, truth.image_error),
-    }
-    rows = []
-    for values, (what, (means, errors, image_error)), wide in zip(blocks, against.items(), spreads, strict=True):
-        scale = truth.mean.mean()
-        z, error = z_and_error(values.mean(axis=1), float(means.mean()), image_error)
-        z_blocks = [z_and_error(values[:, b], means[b], errors[b]) for b in range(BLOCKS)]
-        worst, power = max(abs(each) for each, _ in z_blocks), max(each for _, each in z_blocks) / by_block.mean()
-        holds = error <= EPS * scale and max(abs(z), worst) <= SIGMA and wide <= SPREAD
-        note = f"z {z:+.2f}; blocks |z| <= {worst:.2f}, SE <= {power:.2%}; z-spread of pixels {wide:.2f}"
-        bias, limit = (values.mean() - means.mean()) / scale, f"|z| <= {SIGMA:g}, SE <= {EPS:.1%}, spread <= {SPREAD}"
-        rows.append(Row(CLAIMS, f"{case}: bias {what}", bias, limit, bool(holds), len(values), error / scale, note))
-    return rows
-
-
-CLAIMS = "GRIS-A05, GRIS-C11"
+CLAIMS, EPS = "GRIS-A05, GRIS-C11", 0.005
 JOB = Job("ReSTIR PT against its own initial samples and against references, by replicas", chunks, compute, judge)

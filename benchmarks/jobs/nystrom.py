@@ -61,7 +61,7 @@ class Fineness:
     film: int
 
 
-COARSE, FINE = Fineness(2000, 256, 24), Fineness(4000, 512, 48)
+COARSE, FINE = Fineness(6000, 384, 24), Fineness(12000, 768, 48)
 
 
 @dataclass(frozen=True, eq=False)

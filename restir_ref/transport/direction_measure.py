@@ -74,7 +74,7 @@ def direction_jacobian(d: int, x: Walk, y: Walk) -> Array:
     i, k = np.arange(len(x.of.p))[:, None], np.arange(len(x.c))
     replayed = (i >= 1) & (i < np.where(x.c > 0, x.c - 1, x.x.k + 1))
     J = np.where(replayed, replay_jacobian(x.of, y.of), 1.0).prod(axis=0)
-    return J * np.where(x.c > 0, reconnection_jacobian(d, x.of, y.of)[x.c, k], 1.0)
+    return np.asarray(J * np.where(x.c > 0, reconnection_jacobian(d, x.of, y.of)[x.c, k], 1.0))
 
 
 def replay_jacobian(x: Factors, y: Factors) -> Array:

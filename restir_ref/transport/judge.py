@@ -90,6 +90,9 @@ def report(judgement: Judgement) -> str:
 def _lines(t: Tracer, name: str, found: Finding) -> Iterator[str]:
     law = (CHECKS[name].__doc__ or "").splitlines()[0]
     yield f"{'RED  ' if found.red else 'green'} {name}: {law}"
+    if not found.tested:
+        yield "      undecided: too few paths arrive, or too noisy; give it more paths, or a brighter scene"
+        return
     yield f"      {found.failed} of {found.tested} fail, the worst error is {found.worst:.3g} times what is tolerated"
     if found.red and found.offender is not None:
         yield from (f"      {line}" for line in path_in_words(t, found.offender))

@@ -18,7 +18,7 @@ from restir_ref.batch import Array, ratio
 from restir_ref.guards import whole
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
-from restir_ref.transport.rays import arrive, emitted, light_pdf, sample_light
+from restir_ref.transport.rays import GRAZING, arrive, emitted, light_pdf, sample_light
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import norm
 
@@ -192,7 +192,7 @@ def light_leaf(t: Tracer, v: Vertex, P: Array, u: Array, i: int) -> tuple[Leaf, 
     w = to / r
     cos_y = -np.einsum("dn,dn->n", light.n, w)
     f, p_all = mat.evaluate_all(s.materials, s.space, v, P, s.space.to_local(v.n, w))
-    seen = (cos_y > 0) & (f > 0).any(axis=0)
+    seen = (cos_y > GRAZING) & (f > 0).any(axis=0)
     p_light = light.pdf_area * r ** (s.space.d - 1) / np.where(seen, cos_y, 1)
     facing = np.flatnonzero(seen)
     seen[facing] = s.visible(v.x.take(facing, axis=-1), light.y.take(facing, axis=-1))

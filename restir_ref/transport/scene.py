@@ -121,7 +121,7 @@ def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], 
 
 def _check_scene(d: int, materials: Sequence[Material], facets: Sequence[Facet], balls: Sequence[Ball]) -> int:
     """Number of channels; raises ValueError."""
-    channels = {len(facet.emission) for facet in facets if any(facet.emission)}
+    channels = {np.size(facet.emission) for facet in facets if np.any(facet.emission)}
     if len(channels) != 1:
         raise ValueError(
             f"the lights have {sorted(channels)} channels, but all must have the same number."
@@ -134,17 +134,21 @@ def _check_scene(d: int, materials: Sequence[Material], facets: Sequence[Facet],
         if np.shape(ball.centre) != (d,) or not 0 < ball.radius < np.inf or not np.isfinite(ball.centre).all():
             raise ValueError(f"{ball} needs a centre of {d} finite coordinates and a positive, finite radius.")
     for index in {facet.material for facet in facets} | {ball.material for ball in balls}:
-        if not 0 <= index < len(materials):
+        if not (index == int(index) and 0 <= index < len(materials)):
             raise ValueError(f"there is no material {index!r}: the scene has {len(materials)}, counted from 0.")
     return max(channels)
 
 
 def _check_facet(facet: Facet, d: int, channels: int) -> None:
-    if [len(corner) for corner in facet.corners] != [d] * d or not np.isfinite(facet.corners).all():
+    if [np.size(corner) for corner in facet.corners] != [d] * d or not np.isfinite(facet.corners).all():
         raise ValueError(f"a facet needs {d} corners of {d} finite coordinates each, but {facet} has others.")
-    if len(facet.emission) not in (0, channels) or not all(0 <= e < np.inf for e in facet.emission):
+    if (
+        np.ndim(facet.emission) != 1
+        or len(facet.emission) not in (0, channels)
+        or not all(0 <= e < np.inf for e in facet.emission)
+    ):
         raise ValueError(
-            f"emission must be {channels} finite numbers >= 0, or () for none, but is {facet.emission} in {facet}."
+            f"emission must be {channels} finite numbers >= 0, or () for none, but is {facet.emission!r} in {facet}."
         )
 
 
@@ -158,7 +162,9 @@ def _normals_and_sizes(corners: Array) -> tuple[Array, Array]:
     flatness = length / np.maximum(np.abs(edges).max(axis=(1, 2)) ** (d - 1), 1e-300)
     worst = int(np.argmin(flatness))
     if not flatness[worst] > 1e-10:
-        raise ValueError(f"facet {worst} is degenerate: its corners are {corners[worst].tolist()}.")
+        raise ValueError(
+            f"facet {worst} is degenerate: its corners are {corners[worst].tolist()}; move them apart, or leave it out."
+        )
     return normals / length[:, None], length / np.prod(np.arange(1, d))
 
 

@@ -132,6 +132,10 @@ class Finding:
         return self.failed > self.allowed or not self.tested
 
 
+UNDECIDED = Finding(0, 0, 0, np.inf)
+"""Too few paths, or too noisy: no acquittal."""
+
+
 # What was found and expected, quantity by quantity.
 
 
@@ -166,17 +170,17 @@ def _known(error: Array) -> Array:
     return np.where(np.isnan(error), np.inf, error)
 
 
+AT_RECONNECTION = ("prim", "lobe_in", "lobe_out")
+
+
 def same_path(case: Case, found: Path, expected: Path) -> list[Quantity]:
     """All that two records of one path agree in; numbers count up to the reconnection, where they get stale."""
     t, met = case.of.tracer, expected.c > 0
     row = np.arange(t.D)[:, None] - t.sensor.numbers
     fresh = ~met | (row < 2 * t.scene.space.d * (expected.c - 2))
-    discrete = [(each, getattr(found, each), getattr(expected, each)) for each in ("k", "nee", "c")]
-    at_z = [
-        (each, getattr(found, each) * met, getattr(expected, each) * met) for each in ("prim", "lobe_in", "lobe_out")
-    ]
     return [
-        *(equal(*each) for each in (*discrete, *at_z)),
+        *(equal(each, getattr(found, each), getattr(expected, each)) for each in ("k", "nee", "c")),
+        *(equal(each, getattr(found, each) * met, getattr(expected, each) * met) for each in AT_RECONNECTION),
         apart("u before the reconnection", found.u, expected.u, fresh),
         apart("x_c", found.z, expected.z, met, t.scene.extent),
         apart("direction leaving x_c", found.out, expected.out, met & (expected.c <= expected.k)),
@@ -214,9 +218,8 @@ def there_and_back(case: Case) -> Finding:
 
 def defined_back(case: Case) -> Finding:
     """T_ji is defined wherever T_ij leads: nothing is refused one way only.  [GRIS 7.1]"""
-    return finding(
-        case, case.good, [equal("T_ji is defined", case.good.J_back > 0, np.ones(len(case.good.J), dtype=bool))]
-    )
+    defined = case.good.J_back > 0
+    return finding(case, case.good, [equal("T_ji is defined", defined, np.ones_like(defined))])
 
 
 def inverse_jacobians(case: Case) -> Finding:
@@ -227,33 +230,41 @@ def inverse_jacobians(case: Case) -> Finding:
 
 def traced_from_scratch(case: Case) -> Finding:
     """The tracer, given u^y, finds y."""
-    return finding(case, case.good, same_path(case, retraced(case), case.good.y))
+    at, (u, y) = case.good, retraced(case)
+    inside = apart("u^y outside [0, 1]", u, np.clip(u, 0, 1), np.ones(len(at.J), dtype=bool))
+    return finding(case, at, [inside, *same_path(case, y, at.y)])
 
 
-def retraced(case: Case) -> Path:
-    """What the tracer finds in pixels j, given u^y."""
+def retraced(case: Case) -> tuple[Array, Path]:
+    """u^y, and the path that the tracer finds there in pixels j."""
     at = case.good
-    return traced(case.of.tracer, case.u_y(at.x, at.i, at.y, at.j), at.j, at.x.k, at.x.nee)
+    u = case.u_y(at.x, at.i, at.y, at.j)
+    return u, traced(case.of.tracer, u, at.j, at.x.k, at.x.nee)
 
 
 def shifted_again(case: Case) -> Finding:
     """An offset path is a path: shifted on to a third pixel it becomes what the freshly traced one becomes."""
-    at, fresh = case.good, retraced(case)
+    at, (_, fresh) = case.good, retraced(case)
     on = np.clip(2 * at.j - at.i, 0, case.of.n - 1)
     (z, J), (z_fresh, J_fresh) = case.shift(at.y, at.j, on), case.shift(fresh, at.j, on)
     something = np.maximum(case.p_hat(z) * J, case.p_hat(z_fresh) * J_fresh) > NOTHING * case.p_hat(at.y)
-    compared = [*same_path(case, z, z_fresh), relative("J", J, J_fresh, DENSITIES)]
-    both = (J > 0) & (J_fresh > 0)
-    compared = [replace(each, error=np.where(both, each.error, 0)) for each in compared]
-    compared = [equal("T is defined", J > 0, J_fresh > 0), *compared]
-    return finding(case, at, [replace(each, error=np.where(something, each.error, 0)) for each in compared])
+    both = something & (J > 0) & (J_fresh > 0)
+    defined = only(something, [equal("T is defined", J > 0, J_fresh > 0)])
+    return finding(case, at, defined + only(both, [*same_path(case, z, z_fresh), relative("J", J, J_fresh, DENSITIES)]))
+
+
+def only(where: Array, quantities: list[Quantity]) -> list[Quantity]:
+    """Errors elsewhere do not count."""
+    return [replace(each, error=np.where(where, each.error, 0)) for each in quantities]
 
 
 def finite_differences(case: Case) -> Finding:
-    """J = |det du^y / du^x|, differences in two steps extrapolated; where these disagree nothing is decided."""
+    """J = |det du^y / du^x|; where the differences of two steps disagree nothing is decided."""
     at = take(case.good, spread(case.good.x, case.effort.jacobians))
     coarse, fine = (stretch(case, at, h) for h in (2 * case.effort.step, case.effort.step))
     decided = np.flatnonzero(np.abs(fine - coarse) <= DERIVATIVES * np.abs(fine))
+    if 2 * len(decided) < len(fine):
+        return UNDECIDED
     at, measured = take(at, decided), ((4 * fine - coarse) / 3)[decided]
     return finding(case, at, [relative("J", at.J, measured, DERIVATIVES)])
 

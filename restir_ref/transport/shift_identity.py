@@ -16,7 +16,7 @@ import numpy as np
 from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Chance, Live
 from restir_ref.transport.paths import Path
-from restir_ref.transport.shift_checks import Case, Finding, Offender, pairs
+from restir_ref.transport.shift_checks import UNDECIDED, Case, Finding, Offender, pairs
 
 SIGMAS, NOISE, FEW, BLOCKS = 5.0, 0.05, 50, 4
 """Largest |z|; largest relative standard error of the whole; fewest paths of a kind; blocks of pixels."""
@@ -78,7 +78,7 @@ def change_of_variables(case: Case) -> Finding:
     left, right = _left(case, i, j, tape), _right(case, i, j, replace(tape, at=0))
     means = [each for each in _means(left, right, i, j, case.of.n) if each.paths >= FEW]
     if not means or means[0].error > NOISE * means[0].right:
-        return Finding(0, 0, 0, np.inf)
+        return UNDECIDED
     worst = max(means, key=lambda mean: mean.z)
     failed = sum(mean.z > SIGMAS for mean in means)
     culprit = _culprit(left, right, worst, i, j) if failed else None

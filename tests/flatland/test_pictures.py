@@ -182,7 +182,7 @@ def test_the_scale_of_a_map_is_in_fluence():
         ax = Figure().subplots()
         bar = pictures.fluence_picture(ax, setting, values)
     shown = ax.images[0].norm(values)
-    assert (bar.vmin, bar.vmax) == (0, 300)
+    assert (bar.vmin, bar.vmax) == pytest.approx((0, 300))
     assert np.all(np.diff(np.asarray(shown).ravel()) > 0)
     assert np.asarray(shown).max() == pytest.approx(1)
     assert ax.images[0].get_extent() == [0, 2, 0, 1]
@@ -194,7 +194,7 @@ def test_ticks_are_round_and_on_the_scale(top):
     ticks = pictures.fluence_ticks(3 / top, top)
     assert 4 <= len(ticks) <= 6
     assert (ticks[0], bool(ticks[-1] <= top)) == (0, True)
-    assert all(re.fullmatch(r"[\d.]5?0*(e[+-]\d+)?", f"{2 * tick:.3g}") or len(f"{tick:.2g}") <= 6 for tick in ticks)
+    assert [float(f"{tick:.2g}") for tick in ticks] == pytest.approx(list(ticks))
 
 
 # ---------------------------------------------------------------- shifts
@@ -216,9 +216,15 @@ def sees(p, a, b):
     return bool(p.t.scene.visible(a, b)[0])
 
 
+def reconnects_from_scratch(p):
+    """Where y reconnects if its numbers are traced in its own pixel, or after x_c if it does not before."""
+    path = shift_pictures.leaf_path(p.t, p.x.u, p.y.pixel, p.x.k, p.x.nee)
+    return int(path.c[0]) if p.c == 0 or 0 < path.c[0] < p.c else p.c + 1
+
+
 REASONS = {
     r"the replay is lost after \$y_\d\$": lambda p, last: not p.y.seen[:last].all(),
-    r"\$y\$ would reconnect at \d": lambda p, last: p.t.rule.roughness < np.inf,
+    r"\$y\$ would reconnect at \d": lambda p, last: reconnects_from_scratch(p) not in (0, p.c),
     r"\$y\$ cannot reconnect there": lambda p, last: p.c > 0,
     r"something stands between .*": lambda p, last: not sees(p, p.y.x[last], p.x.x[p.c]),
     r"its light is hidden": lambda p, last: not sees(p, p.y.x[last], p.y.x[last + 1]),
@@ -231,7 +237,7 @@ REASONS = {
 def test_an_undefined_shift_has_a_true_reason(scene, rule):
     found = lit_pairs(scene, rule)
     undefined = [p for p in found if p.J == 0]
-    assert len(found) > 5
+    assert len([p for p in found if p.J > 0]) > 0
     for p in undefined:
         (holds,) = [true for words, true in REASONS.items() if re.fullmatch(words, shift_pictures.why_undefined(p))]
         assert holds(p, p.c - 1 if p.c else int(p.y.k[0]))

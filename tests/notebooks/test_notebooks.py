@@ -51,8 +51,8 @@ def run(notebook):
 every_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 
 
-def test_there_are_three_notebooks_in_order():
-    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_"]
+def test_there_are_five_notebooks_in_order():
+    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_"]
 
 
 @every_notebook
@@ -101,6 +101,26 @@ def test_find_the_bug_runs_and_gives_nothing_away(capsys):
     assert list(names["suspects"]) == list("ABCDEF")
     shown = capsys.readouterr().out + str(names["suspects"])
     assert not [name for name in names["lab"].names() if name in shown]
+
+
+def test_shift_mappings_you_can_see_tells_the_truth():
+    names = run(read(NOTEBOOKS[3]))
+    assert {shift: pair.c for shift, pair in names["pairs"].items()} == {"replay": 0, "reconnection": 2, "hybrid": 4}
+    kept = {shift: pair.J * pair.gain for shift, pair in names["pairs"].items()}
+    assert kept["reconnection"] < 0.02
+    assert min(kept["replay"], kept["hybrid"]) > 0.8
+    assert max(error for error, _ in names["back"].values()) < 1e-9
+
+
+def test_restir_pt_frame_by_frame_tells_the_truth(capsys):
+    names = run(read(NOTEBOOKS[4]))
+    initial, spatial, second = names["lit"].values()
+    assert initial < 0.1
+    assert 0.2 < spatial < second / 2
+    assert (names["Y"].c == 4).all()
+    assert (names["Z"].c == 20).all()
+    assert "pixels with light" in capsys.readouterr().out
+    assert 0.8 < names["film"].seen[1:].mean() < 1
 
 
 # ---------------------------------------------------------------- controls

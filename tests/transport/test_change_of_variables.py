@@ -79,7 +79,8 @@ def tried(of: PathIntegrals, N: int, seed: int) -> Shifts:
     (there,) = random_in_row(of, i, 1, REACH, chance)
     X = initial(Pixels(PathIntegrals(of.tracer), i), chance)
     y = shifted(X.x, Pixels(of, i), there)
-    good = np.flatnonzero((y.J > 1e-12) & y.x.F.any(axis=0) & X.x.F.any(axis=0))  # J = 0 but for rounding: in a facet
+    there_at_all = (y.J > 0) & (y.x.A > 1e-12 * X.x.A)  # else J = 0 but for rounding: two points of one facet
+    good = np.flatnonzero(there_at_all & y.x.F.any(axis=0) & X.x.F.any(axis=0))
     return Shifts(of.tracer, take(X.x, good), i[good], take(y.x, good), there.index[good], y.J[good])
 
 

@@ -1,0 +1,111 @@
+"""Means over replicas against a truth, as bench jobs state them: image, eight blocks of pixels, and all pixels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.jobs.job import Row
+from figures.figure import Arrays
+from restir_ref.batch import Array
+
+BLOCKS = 8
+SIGMA, SPREAD = 4.0, 1.3
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a mean image should be, (n,), the standard errors of its pixels (n,) and of its mean."""
+
+    mean: Array
+    error: Array
+    image_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """R images in short: means of blocks (R, BLOCKS), and sums of pixels and of their squares (n,)."""
+
+    blocks: Array
+    total: Array
+    square: Array
+
+    @property
+    def R(self) -> int:
+        """Number of images."""
+        return len(self.blocks)
+
+    @property
+    def mean(self) -> Array:
+        """The mean image."""
+        return np.asarray(self.total / self.R)
+
+    @property
+    def error(self) -> Array:
+        """Standard errors of the mean's pixels."""
+        return np.asarray(np.sqrt(np.maximum(self.square / self.R - self.mean**2, 0) / (self.R - 1)))
+
+
+def nothing(n: int) -> Truth:
+    """The truth of differences: 0."""
+    return Truth(np.zeros(n), np.zeros(n), 0.0)
+
+
+def sums(images: Array) -> Sums:
+    """Of images (R, n)."""
+    R = len(images)
+    return Sums(images.reshape(R, BLOCKS, -1).mean(axis=-1), images.sum(axis=0), (images**2).sum(axis=0))
+
+
+def stored(found: Sums, name: str) -> Arrays:
+    """Sums as arrays of a chunk."""
+    return {f"{name}.{part}": value for part, value in vars(found).items()}
+
+
+def joined(chunks: list[Arrays], name: str) -> Sums:
+    """The sums of several chunks."""
+    blocks, total, square = ([chunk[f"{name}.{part}"] for chunk in chunks] for part in ("blocks", "total", "square"))
+    return Sums(np.concatenate(blocks), np.sum(total, axis=0), np.sum(square, axis=0))
+
+
+def as_truth(found: Sums) -> Truth:
+    """A mean image as the truth for another one."""
+    image = found.blocks.mean(axis=1)
+    return Truth(found.mean, found.error, float(image.std(ddof=1) / np.sqrt(found.R)))
+
+
+def judged(claims: str, what: str, found: Sums, truth: Truth, scale: float, eps: float) -> Row:
+    """Unbiased: |z| <= 4 for the image and its blocks, SE of the image <= eps, all relative to `scale`."""
+    means, errors = truth.mean.reshape(BLOCKS, -1).mean(axis=1), truth.error.reshape(BLOCKS, -1)
+    by_block = z_scores(found.blocks, means, np.sqrt((errors**2).sum(axis=1)) / errors.shape[1])
+    z, error = (
+        float(each[0]) for each in z_scores(found.blocks.mean(axis=1)[:, None], means.mean(), truth.image_error)
+    )
+    worst, block_error = np.abs(by_block[0]).max(), by_block[1].max()
+    pixels = np.hypot(found.error, truth.error)
+    spread = float(np.sqrt(np.mean(((found.mean - truth.mean) / np.where(pixels > 0, pixels, np.inf)) ** 2)))
+    holds = error <= eps * scale and max(abs(z), worst) <= SIGMA and spread <= SPREAD
+    note = f"z {z:+.2f}; blocks |z| <= {worst:.2f}, SE <= {block_error / scale:.2%}; z-spread of pixels {spread:.2f}"
+    bias = float(found.mean.mean() - truth.mean.mean()) / scale
+    limit = f"|z| <= {SIGMA:g}, SE <= {eps:.1%}, spread <= {SPREAD}"
+    return Row(claims, what, bias, limit, bool(holds), found.R, error / scale, note)
+
+
+def biased(claims: str, what: str, found: Sums, truth: Truth, scale: float, least: float) -> Row:
+    """A control: certainly biased, |bias| > least with |z| >= 8."""
+    z, error = of_image(found, truth)
+    bias = float(found.mean.mean() - truth.mean.mean()) / scale
+    holds = abs(bias) > least and abs(z) >= 8
+    limit = f"control: |bias| > {least:.0%}, |z| >= 8"
+    return Row(claims, what, bias, limit, bool(holds), found.R, error / scale, f"z {z:+.1f}")
+
+
+def of_image(found: Sums, truth: Truth) -> tuple[float, float]:
+    """z of the image's mean, and its standard error."""
+    z, error = z_scores(found.blocks.mean(axis=1)[:, None], truth.mean.mean(), truth.image_error)
+    return float(z[0]), float(error[0])
+
+
+def z_scores(samples: Array, truth: Array | float, truth_error: Array | float) -> tuple[Array, Array]:
+    """z of means over replicas against the truth, and standard errors with the truth's; samples (R, K)."""
+    error = np.hypot(samples.std(axis=0, ddof=1) / np.sqrt(len(samples)), truth_error)
+    return np.asarray((samples.mean(axis=0) - truth) / error), np.asarray(error)

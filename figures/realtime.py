@@ -1,0 +1,122 @@
+"""Real-time renderers in flatland: chains of frames, their camera still or moving two to three pixels per frame.
+
+A moving inset is the middle of a wider row: what enters at the row's ends has no neighbours beyond them and no
+history of its own, as happens at the ends of a film of 1920 pixels only.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from figures.figure import Arrays
+from figures.flatland import HYBRID, Traced, estimates, film, means, moving, path_tracing, samples_of_equal_cost, view
+from flatland2d.motion import motion
+from flatland2d.sensors import Pinhole
+from restir_ref.batch import Array
+from restir_ref.chance import Chance, Live
+from restir_ref.transport.counting import rays
+from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
+from restir_ref.transport.restir_gi import RadianceIntegrals
+from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
+
+FRAMES = 20
+"""Frames of a chain; the last one is judged, or of a still camera the last half."""
+
+STEP = 0.001
+"""Units of length that the camera moves per frame."""
+
+MARGIN = 64
+"""Pixels rendered on either side of a moving inset: about as far as anything moves in a chain."""
+
+MOTION_RAYS = 2
+"""Rays of a pixel's motion vector.  Replicas share them here; each is charged for its own."""
+
+TREES_IN_A_FRAMES_TIME = 7
+"""Path trees that take as long as one frame of ours per pixel: median over scenes, CPU time, measured once."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """What ReSTIR shares between pixels: a rule of connections, and integrals with their shift."""
+
+    rule: Connectability
+    integrals: Callable[[Tracer], Traced] = PathIntegrals
+
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "hybrid": Method(HYBRID),
+        "no distance test": Method(Connectability(HYBRID.roughness, 0.0)),
+        "reconnection": Method(RECONNECTION, ReconnectionAtX2),
+        "ReSTIR GI": Method(RECONNECTION, RadianceIntegrals),
+    }
+)
+
+
+def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator) -> Arrays:
+    """The last frame of a moving camera, (replicas, n), and its rays per pixel."""
+    asked = Counter[str]()
+    views = [method.integrals(view(scene, method.rule, asked, sensor).tracer) for sensor in widened(scene)]
+    *_, (images, cost) = costed(views, asked, replicas, Live(rng))
+    return {"images": inset(images), "rays": np.array(cost)}
+
+
+def still(method: Method, scene: str, replicas: int, rng: np.random.Generator) -> Arrays:
+    """The first frame and the last half of a still camera's, (1 + FRAMES // 2, replicas, n), and rays per pixel."""
+    asked = Counter[str]()
+    of = method.integrals(view(scene, method.rule, asked).tracer)
+    frames = list(costed([of] * FRAMES, asked, replicas, Live(rng)))
+    kept = [frames[0], *frames[FRAMES // 2 :]]
+    return {"images": np.stack([images for images, _ in kept]), "rays": np.array(frames[-1][1])}
+
+
+def costed(views: Sequence[Traced], asked: Counter[str], replicas: int, chance: Chance) -> list[tuple[Array, float]]:
+    """Every frame of the real-time preset, (replicas, n), with its rays per pixel."""
+    found, spent = [], rays(asked)
+    for of, images in zip(views, film(views, replicas, chance, sources=motion_vectors), strict=True):
+        found.append((images, (rays(asked) - spent) / (replicas * of.n) + MOTION_RAYS))
+        spent = rays(asked)
+    return found
+
+
+def motion_vectors(of: Traced, before: Traced) -> Array:
+    """The previous pixel of every pixel, (n,)."""
+    now, then = of.tracer.sensor, before.tracer.sensor
+    return motion(of.tracer.scene, now, then).source  # type: ignore[arg-type]
+
+
+def widened(scene: str) -> list[Pinhole]:
+    """The moving inset's sensors, MARGIN pixels wider on both sides."""
+    sensors = moving(scene, FRAMES, STEP)
+    return [replace(each, n=each.n + 2 * MARGIN, first=each.first - MARGIN) for each in sensors]
+
+
+def inset(images: Array) -> Array:
+    """The middle of wider images, (..., n)."""
+    return images[..., MARGIN:-MARGIN]
+
+
+def trees(scene: str, count: int, rng: np.random.Generator) -> Arrays:
+    """Independent images of one path tree per pixel, (count, n), and rays per tree."""
+    asked = Counter[str]()
+    found = estimates(path_tracing(1), view(scene, HYBRID, asked), asked, count, Live(rng))
+    return {"images": found.images, "rays": np.array(found.rays)}
+
+
+def at_equal_rays(trees: Arrays, rays_ours: float) -> Array:
+    """Means of as many path trees as cost at least so many rays, (groups, n)."""
+    return means(trees["images"], samples_of_equal_cost(rays_ours, float(trees["rays"])))
+
+
+def at_equal_time(trees: Arrays) -> Array:
+    """Means of as many path trees as take the time of a frame, (groups, n)."""
+    return means(trees["images"], TREES_IN_A_FRAMES_TIME)
+
+
+def paired(errors: Array, others: Array) -> tuple[Array, Array]:
+    """As many replicas of both."""
+    R = min(len(errors), len(others))
+    return errors[:R], others[:R]
