@@ -77,8 +77,8 @@ def draw_scene(panels: Sequence["Axes"] | Array, scene: str, a: Arrays) -> None:
 
 
 def sentence(scene: str) -> str:
-    """What the scene is for, from its docstring, in short lines."""
-    words = " ".join((SCENES[scene].__doc__ or "").split())
+    """What the scene is for, the first sentence of its docstring, in short lines."""
+    words = " ".join((SCENES[scene].__doc__ or "").partition("\n\n")[0].split())
     return "\n".join(textwrap.wrap(f"{scene}, {words}", 46))
 
 

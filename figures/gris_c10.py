@@ -13,11 +13,16 @@ from figures.figure import Arrays, Claim, Figure
 from figures.flatland import offline as one_frame
 from figures.references import reference
 from flatland2d import SCENES
+from flatland2d.gbuffer import alike, gbuffer
 from flatland2d.radiosity import corners
 from restir_ref.batch import Array
+from restir_ref.chance import Chance
+from restir_ref.integrals import Pixels
+from restir_ref.loop import OFFLINE, alike_in_row, frame
 from restir_ref.metrics import SMALL
+from restir_ref.restir import shade
 from restir_ref.transport.paths import Connectability
-from restir_ref.transport.rays import arrive
+from restir_ref.transport.restir_pt import PathIntegrals
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
@@ -29,18 +34,26 @@ NEAR = 0.05
 
 
 def chunks(preset: Any) -> Sequence[dict[str, int]]:
-    """One per distance."""
-    return [{"distance": k} for k in range(len(DISTANCES))]
+    """One per distance, and one with neighbours that see alike."""
+    return [{"distance": k} for k in range(len(DISTANCES) + 1)]
 
 
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
-    """Independent images (count, 128) with one least distance."""
-    rule = Connectability(0.2, DISTANCES[chunk["distance"]])
-    return offline.render(offline.Method(one_frame, rule), SCENE, preset["count"], rng)
+    """Independent images (count, 128) with one least distance; the last has none, but neighbours by G-buffer."""
+    rules = [offline.Method(one_frame, Connectability(0.2, d)) for d in DISTANCES]
+    methods = [*rules, offline.Method(among_alike, Connectability(0.2, 0))]
+    return offline.render(methods[chunk["distance"]], SCENE, preset["count"], rng)
+
+
+def among_alike(of: PathIntegrals, index: Array, chance: Chance) -> Array:
+    """An offline frame whose neighbours have similar normals and distances."""
+    near = alike_in_row(alike(gbuffer(of.tracer.scene, of.tracer.sensor)))
+    here = Pixels(of, index)
+    return np.asarray(shade(frame(here, chance, OFFLINE, near), here).mean(axis=0))
 
 
 def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
-    """Images (distance, count, n), rays (distance,), the reference, and distances to other surfaces (n,)."""
+    """Images (distance + 1, count, n), rays, the reference, and distances to other surfaces (n,)."""
     arrays = {name: np.stack([part[name] for part in results]) for name in results[0]}
     return {**arrays, "reference": reference(SCENE).mean, "clearance": clearance()}
 
@@ -49,8 +62,7 @@ def clearance() -> Array:
     """Distance of what the middle of each pixel sees to the nearest other surface, (n,)."""
     setting = SCENES[SCENE]()
     sensor = setting.pinhole()
-    x, w, _ = sensor.ray(np.arange(sensor.n), np.full((1, sensor.n), 0.5))
-    v, _, _ = arrive(setting.scene, x, w)
+    v = gbuffer(setting.scene, sensor)
     a, b = corners(setting.scene)
     edge = b - a
     along = np.einsum("ds,dsn->sn", edge, v.x[:, None] - a[:, :, None]) / (edge**2).sum(axis=0)[:, None]
@@ -91,9 +103,9 @@ def draw(a: Arrays) -> "Picture":
     """Error per pixel, and where the crease is."""
     picture, axes = style.panels(1, 1, width=6.0, height=3.2)
     axis, truth = axes[0, 0], a["reference"]
-    for k, d in enumerate(DISTANCES):
-        error = ((a["images"][k] - truth) ** 2 / truth**2).mean(axis=0)
-        axis.semilogy(error, label=f"d = {d:.0%} of the room")
+    names = [*(f"d = {d:.0%} of the room" for d in DISTANCES), "d = 0, neighbours that see alike"]
+    for name, images in zip(names, a["images"], strict=True):
+        axis.semilogy(((images - truth) ** 2 / truth**2).mean(axis=0), label=name)
     for place in np.flatnonzero(a["clearance"] < NEAR):
         axis.axvspan(place - 0.5, place + 0.5, color="#dddddd", lw=0, zorder=0)
     axis.set(xlabel="pixel of the inset (crease pixels grey)", ylabel="relative squared error of a frame")

@@ -61,7 +61,7 @@ def tracer(rule: Connectability, roughness: float = ROUGHNESS) -> Tracer:
 
 def by_hand(t: Tracer, k: int) -> Path:
     """The path over the first k of POINTS that ends in light sampling, one column in pixel PIXEL."""
-    u, here = np.full((t.D, 1), 0.5), np.array([PIXEL])
+    u, here = np.full((t.D, 1), 0.5), np.full(1, PIXEL)
     v, _, _ = first_hit(t, u, here)
     for i, point in enumerate(POINTS[1:], start=1):
         w = normalize(np.array(point)[:, None] - v.x)
@@ -85,7 +85,7 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
 
 def offset_from_scratch() -> Arrays:
     """Vertices x_0 .. of base and offset path (K, 2), the numbers u of both, and F of the shift and from scratch."""
-    t, i, j = tracer(HYBRID), np.array([PIXEL]), np.array([PIXEL + STEP])
+    t, i, j = tracer(HYBRID), np.full(1, PIXEL), np.full(1, PIXEL + STEP)
     x = by_hand(t, 4)
     y, J = shift_path(t, x, j)
     u = primary_sample(t, x, i, t, y, j)

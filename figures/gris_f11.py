@@ -37,10 +37,10 @@ def against_tracing(a: Arrays, T: int, method: str) -> Claim:
 
 
 REASON = (
-    "The mean is that of the dozen pixels beside the edge of the box, where neighbours see other surfaces: what one "
-    "path of each of seven pixels tells is noisier there than the pixel's own 32 trees. In this easy scene those leave "
-    "9% error; elsewhere reuse helps (right panel). It also helps where one tree is all there is, and behind the slit "
-    "(GRIS-F01, F17)."
+    "The mean is that of a dozen pixels in the corner of floor and box (right panel): what neighbours see there is "
+    "another surface, or the same from ten times as far, and one path of each of seven pixels tells less than the "
+    "pixel's own 32 trees, which leave 9% error in this easy scene. Elsewhere reuse halves the error; it also helps "
+    "where one tree is all there is (GRIS-F01), and where light is hard to find (GRIS-F17)."
 )
 
 

@@ -120,7 +120,7 @@ def draw(a: Arrays) -> "Picture":
     axes[0, 0].set(xlabel="pixel of the inset", ylabel="relative squared error of a frame", title="Clear-coat floor")
     axes[0, 0].legend()
     heights = [a[f"{SCENE}.{method}.replayed"].mean() for method in INTEGRALS]
-    axes[0, 1].bar(list(INTEGRALS), heights, color=style.COLOURS[: len(heights)])
+    axes[0, 1].bar(list(INTEGRALS), heights, color=style.COLOURS[: len(heights)], edgecolor="k")
     axes[0, 1].set(ylabel="vertices replayed per shift", title="Length of replay")
     axes[0, 1].grid(axis="x", visible=False)
     return picture

@@ -95,10 +95,17 @@ def draw(a: Arrays) -> "Picture":
     return picture
 
 
+def look(k: int) -> dict[str, Any]:
+    """Colour and marker of the k-th method."""
+    return {"color": style.COLOURS[k], "marker": style.MARKERS[k], "markevery": 1}
+
+
 def draw_images(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
     """One image of each method as a strip above the reference."""
     rows = [image[0] for image in images.values()]
-    axis.imshow([*rows, truth], vmin=0, vmax=2 * truth.max(), aspect="auto", extent=(0, len(truth), len(rows) + 1, 0))
+    place = (0, len(truth), len(rows) + 1, 0)
+    shown = axis.imshow([*rows, truth], vmin=0, vmax=2 * truth.max(), aspect="auto", extent=place)
+    axis.figure.colorbar(shown, ax=axis, label="radiance", extend="max")
     axis.set_yticks(np.arange(len(rows) + 1) + 0.5, [*LABELS.values(), "reference"])
     axis.set_xticks(range(0, len(truth) + 1, TILE))
     axis.grid(visible=False)
@@ -113,14 +120,14 @@ def draw_borders(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
         axis.plot(np.arange(1, len(truth)), pairs, label=LABELS[method])
     axis.set_xticks(range(0, len(truth) + 1, TILE))
     axis.set(xlabel="pixel $x$ (ticks at borders of tiles)", ylabel="error correlation of $x - 1$ and $x$")
-    axis.set(title="Next neighbours", ylim=(-0.45, 1.05))
-    axis.legend(loc="lower left", ncols=3)
+    axis.set(title="Next neighbours", ylim=(-0.65, 1.05))
+    axis.legend(loc="lower left", ncols=2)
 
 
 def draw_errors(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
     """MAPE with the spread over images."""
     for k, each in enumerate(mape(image, truth) for image in images.values()):
-        axis.errorbar(k, each.mean(), each.std(ddof=1), capsize=4, color=style.COLOURS[k], marker=style.MARKERS[k])
+        axis.errorbar(k, each.mean(), each.std(ddof=1), capsize=4, **look(k))
         axis.annotate(f"{each.mean():.3f}", (k, each.mean()), (8, -3), textcoords="offset points")
     axis.set_xticks(range(len(images)), list(LABELS.values()))
     axis.set(ylabel="MAPE of one image, ± its spread", ylim=(0, None), xlim=(-0.4, 2.7), title="Errors at equal rays")

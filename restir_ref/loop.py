@@ -71,6 +71,24 @@ def spread_in_row(of: Image, index: Array, count: int, radius: float, chance: Ch
     return [_moved(of, index, (start + k * GOLDEN) % 1, radius) for k in range(count)]
 
 
+def alike_in_row(alike: Array) -> Around:
+    """Random neighbours within the radius among those that see alike, alike (n, n) bool; else the pixel itself.
+
+    A choice by G-buffers, never by samples.  [GRIS 6.2; Bitterli 2020]
+    """
+    distance = np.abs(np.subtract.outer(np.arange(len(alike)), np.arange(len(alike))))
+
+    def around(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
+        allowed = alike & (distance <= radius) & (distance > 0)
+        choices, listed = allowed.sum(axis=1), np.argsort(~allowed, axis=1, kind="stable")
+        pixel = index % of.n
+        chosen = (chance.uniform((count, len(index))) * choices[pixel]).astype(int)
+        near = np.where(choices[pixel] > 0, listed[pixel, chosen], pixel)
+        return [Pixels(of, index - pixel + each) for each in near]
+
+    return around
+
+
 def _moved(of: Image, index: Array, u: Array, radius: float) -> Pixels:
     """u in [0, 1) chooses one of the steps -radius .. -1, 1 .. radius."""
     reach = int(radius)

@@ -6,6 +6,7 @@ nearly blind to mistakes in shifts, for reuse is nearly symmetric.  `CHECKS` are
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from inspect import getdoc
 from types import MappingProxyType
 
 import numpy as np
@@ -38,7 +39,9 @@ class Shifting(PathIntegrals):
         return Shifted(*self.by(there.tracer, x, to.index % there.n))
 
 
-CHECKS: Mapping[str, Callable[[Case], Finding]] = MappingProxyType(
+Check = Callable[[Case], Finding]
+
+CHECKS: Mapping[str, Check] = MappingProxyType(
     {
         "there and back": by_path.there_and_back,
         "defined back": by_path.defined_back,
@@ -68,8 +71,14 @@ USUAL = Effort()
 """A second or two."""
 
 
-def judge(of: PathIntegrals, chance: Chance, effort: Effort = USUAL, numbers: Numbers = primary_sample) -> Judgement:
-    """Hold every check against the shift of `of`; `numbers` says which primary sample an offset path has.
+def judge(
+    of: PathIntegrals,
+    chance: Chance,
+    effort: Effort = USUAL,
+    numbers: Numbers = primary_sample,
+    checks: Mapping[str, Check] = CHECKS,
+) -> Judgement:
+    """Hold checks against the shift of `of`; `numbers` says which primary sample an offset path has.
 
     Raises ValueError for fewer than two pixels, and where J is negative, NaN or infinite.
     """
@@ -78,7 +87,7 @@ def judge(of: PathIntegrals, chance: Chance, effort: Effort = USUAL, numbers: Nu
     tried = trials(of, effort, chance)
     arrives = of.target(tried.j, tried.y) * tried.J > NOTHING * of.target(tried.i, tried.x)
     case = Case(of, effort, numbers, chance, take(tried, np.flatnonzero((tried.W > 0) & arrives)))
-    return Judgement(of, MappingProxyType({name: check(case) for name, check in CHECKS.items()}))
+    return Judgement(of, MappingProxyType({name: check(case) for name, check in checks.items()}))
 
 
 def report(judgement: Judgement) -> str:
@@ -88,7 +97,7 @@ def report(judgement: Judgement) -> str:
 
 
 def _lines(t: Tracer, name: str, found: Finding) -> Iterator[str]:
-    law = (CHECKS[name].__doc__ or "").splitlines()[0]
+    law = (getdoc(CHECKS[name]) or "").split("\n")[0] if name in CHECKS else "a check of its own"
     yield f"{'RED  ' if found.red else 'green'} {name}: {law}"
     if not found.tested:
         yield "      undecided: too few paths arrive, or too noisy; give it more paths, or a brighter scene"

@@ -32,7 +32,7 @@ CANDIDATES = 32
 
 
 @dataclass(frozen=True)
-class Lit:
+class LightSample:
     """A point on a light, and the radiance f (C, N) that it sends to the sensor by way of x_1, were nothing between."""
 
     light: LightPoint
@@ -51,11 +51,11 @@ class LightIntegrals:
     v: Vertex
     T: Array
 
-    def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Lit, Array]]:
+    def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[LightSample, Array]]:
         """A point on a light that is picked by power; W = 1 / pdf_area."""
         pick, *point = chance.uniform((self.scene.space.d, len(index)))
         light = sample_light(self.scene, pick, np.stack(point))
-        yield Lit(light, self.arriving(index, light)), 1 / light.pdf_area
+        yield LightSample(light, self.arriving(index, light)), 1 / light.pdf_area
 
     def arriving(self, index: Array, light: LightPoint) -> Array:
         """f (C, N): T f |cos_1| |cos_y| / r^(d-1) L_e, for emission is one-sided."""
@@ -67,21 +67,21 @@ class LightIntegrals:
         f, _ = mat.evaluate_all(s.materials, s.space, v, mat.lobe_shares(s.materials, v), s.space.to_local(v.n, w))
         return np.asarray(T * f * np.maximum(-dot(light.n, w), 0) / r ** (s.space.d - 1) * light.emission)
 
-    def target(self, index: Array, x: Lit) -> Array:
+    def target(self, index: Array, x: LightSample) -> Array:
         """p_hat = mean of f over channels, without visibility."""
         return np.asarray(x.f.mean(axis=0))
 
-    def contribution(self, index: Array, x: Lit) -> Array:
+    def contribution(self, index: Array, x: LightSample) -> Array:
         """f, (C, N); visibility is in W."""
         return x.f
 
-    def shift(self, x: Lit, index: Array, to: Pixels) -> Shifted:
+    def shift(self, x: LightSample, index: Array, to: Pixels) -> Shifted:
         """The same point lights another x_1; J = 1 in area."""
         there: LightIntegrals = to.of  # type: ignore[assignment]
-        return Shifted(Lit(x.light, there.arriving(to.index, x.light)), np.ones(len(to.index)))
+        return Shifted(LightSample(x.light, there.arriving(to.index, x.light)), np.ones(len(to.index)))
 
 
-def visibility(at: Pixels, x: Lit) -> Array:
+def visibility(at: Pixels, x: LightSample) -> Array:
     """V(x_1, y), one shadow ray for every sample that would send light; (N,)."""
     of: LightIntegrals = at.of  # type: ignore[assignment]
     clear = np.asarray(x.f.any(axis=0))
@@ -90,7 +90,7 @@ def visibility(at: Pixels, x: Lit) -> Array:
     return clear
 
 
-def seen_target(at: Pixels, x: Lit) -> Array:
+def seen_target(at: Pixels, x: LightSample) -> Array:
     """p_hat V: where an input's samples can be, and how many; (N,)."""
     return target(at, x) * visibility(at, x)
 
@@ -104,7 +104,10 @@ BIASED = WEIGHTS["constant"]
 DEBIASED: Mapping[str, Weights] = MappingProxyType(
     {name: replace(WEIGHTS[name], proxy=seen_target) for name in ("1/Z", "talbot", "defensive")}
 )
-"""Weights that ask which inputs see the sample: [Bitterli 2020] counts them, the others also compare targets."""
+"""Weights that ask which inputs see the sample: 1/Z counts them [Bitterli 2020], the others also compare targets.
+
+All M inputs' samples are asked for, M^2 shadow rays in a pass; Bitterli et al. ask for the selected one's only.
+"""
 
 
 def direct_light(

@@ -20,6 +20,7 @@ from restir_ref.loop import random_in_row
 from restir_ref.restir import initial, shade, spatial, temporal
 from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.transport.zoo import TRANSPORT_BUGS
 
 RULES = {"hybrid": Connectability(0.2, 0.02), "reconnection": RECONNECTION}
 NEIGHBOURS, REACH = 2, 10
@@ -108,10 +109,13 @@ def previous(before: PathIntegrals, now: PathIntegrals) -> PathIntegrals:
     return before
 
 
+BUG = TRANSPORT_BUGS["history rated with the current camera"]
+
+
 def current(before: PathIntegrals, now: PathIntegrals) -> PathIntegrals:
     """A mistake: with the current camera, in the same pixels of the film."""
     film, there = camera(before), camera(now)
-    return PathIntegrals(replace(before.tracer, sensor=replace(film, eye=there.eye, towards=there.towards)))
+    return BUG.wrong(replace(before.tracer, sensor=replace(film, eye=there.eye, towards=there.towards)))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from figures.criteria import all_unbiased, biased, mean_and_blocks, unbiased
+from figures.gris_f15di import direct_image, shadow_edges
 from flatland2d import SCENES
-from flatland2d.radiosity import cut, gather
-from restir_ref.batch import Array, take
+from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.loop import random_in_row
 from restir_ref.mis import Weights
 from restir_ref.restir import initial, shade
-from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit, leaves, trace
+from restir_ref.transport.paths import RECONNECTION, Tracer, leaves, trace
 from restir_ref.transport.restir_di import (
     BIASED,
     CANDIDATES,
@@ -36,21 +36,8 @@ def tracer(scene: str, n: int = PIXELS) -> Tracer:
 
 
 def quadrature(t: Tracer) -> Array:
-    """Direct light at the pixels' centres, from 32 panels per lamp."""
-    v, _, _ = first_hit(t, np.full((1, t.sensor.n), CENTRE), np.arange(t.sensor.n))
-    panels = cut(t.scene, 32)
-    lamps = take(panels, np.flatnonzero(panels.emission > 0))
-    return gather(t.scene, lamps, lamps.emission, v.x, v.prim, v.n)
-
-
-def shadow_edges(t: Tracer) -> Array:
-    """The quarter of the pixels that differ most from those nearby in which lamps they see."""
-    v, _, _ = first_hit(t, np.full((1, t.sensor.n), CENTRE), np.arange(t.sensor.n))
-    lamps = t.scene.lights.corners.mean(axis=0)
-    sees = np.array([t.scene.visible(v.x, np.broadcast_to(lamp[:, None], v.x.shape)) for lamp in lamps.T])
-    near = [sees[:, max(i - RADIUS, 0) : i + RADIUS + 1] for i in range(t.sensor.n)]
-    change = np.array([(sees[:, i : i + 1] != each).mean() for i, each in enumerate(near)])
-    return np.asarray(change >= np.quantile(change, 0.75))
+    """Direct light at the pixels' centres."""
+    return direct_image(t.scene, t.sensor, film=1, per_lamp=32)
 
 
 def images(t: Tracer, mis: Weights, batches: int) -> Array:
@@ -72,14 +59,14 @@ def test_restir_di_whose_weights_see_obstacles_is_unbiased(name) -> None:
     t = tracer("many_lights")
     estimates, truth = images(t, DEBIASED[name], 6), quadrature(t)
     assert all_unbiased(mean_and_blocks(estimates), mean_and_blocks(truth), eps=0.02).passed
-    edges = shadow_edges(t)
+    edges = shadow_edges(t.scene, t.sensor, RADIUS)
     assert unbiased(estimates[:, edges].mean(axis=1), truth[edges].mean(), eps=0.02).passed
 
 
 @pytest.mark.claims("COM-B04")
 def test_restir_di_that_counts_all_inputs_is_too_dark_at_the_edges_of_shadows() -> None:
     t = tracer("many_lights")
-    estimates, truth, edges = images(t, BIASED, 4), quadrature(t), shadow_edges(t)
+    estimates, truth, edges = images(t, BIASED, 4), quadrature(t), shadow_edges(t.scene, t.sensor, RADIUS)
     assert biased(estimates[:, edges].mean(axis=1), truth[edges].mean(), -0.5, -0.01).passed
     assert estimates[:, edges].mean() / truth[edges].mean() < estimates.mean() / truth.mean()
 
@@ -95,7 +82,7 @@ def test_candidates_alone_are_unbiased_without_any_weights() -> None:
 
 
 def whole_images(t: Tracer, chance: Live) -> tuple[Array, Array]:
-    """(C, N) with ReSTIR DI at x_1, and by path tracing alone: direct light only."""
+    """(C, N) with ReSTIR DI at x_1, and by path tracing alone."""
     index = np.arange(REPLICAS * t.sensor.n)
     tree = trace(t, chance.uniform((t.D, len(index))), index % t.sensor.n)
     of = LightIntegrals(t.scene, t.sensor.n, tree.x[0], tree.T[0])

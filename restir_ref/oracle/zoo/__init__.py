@@ -3,7 +3,7 @@
 Every bug is the right loop with one part replaced, on a scene small enough to know its bias
 exactly.  `BUGS` are biased: a check that misses one of them is not a check.  `INEFFICIENT` ones are
 not, they only waste samples.  `CHECKS` is what one can hold against a loop, from a mean to
-Definition 4.1; `python -m restir_ref.oracle.zoo` writes down which check catches which bug.
+Definition 4.1; docs/symptoms.md says which check catches which bug.
 """
 
 from restir_ref.oracle.zoo.bug import Bug, exact_bias, family, of

@@ -15,10 +15,10 @@ MEAN, VARIANCE = "mean with f = p_hat", "variance against the right loop"
 HEAD = """\
 # Symptoms
 
-What is wrong with the image, and which mistake does that. Made by `python -m restir_ref.oracle.zoo > docs/symptoms.md`
-from the bug zoo; do not edit. Every mistake is planted in a loop of ReSTIR small enough to enumerate, so its numbers
-are exact, for one small scene each: in other scenes the sizes differ. The keys in brackets are explained in
-[references.md](references.md).
+What is wrong with the image, and which mistake does that. Made by `python -m restir_ref.transport.zoo >
+docs/symptoms.md` from the bug zoo; do not edit. Every mistake is planted in a loop of ReSTIR small enough to
+enumerate, so its numbers are exact, for one small scene each: in other scenes the sizes differ. Mistakes about paths
+and shifts come last. The keys in brackets are explained in [references.md](references.md).
 
 A bias is relative and belongs to a *cell*, a piece of path space: +50 % means that all light through it is counted one
 and a half times. *Image* is the relative bias of the pixel that is off most: cells that err in opposite directions

@@ -12,7 +12,8 @@ from restir_ref.transport.paths import Tracer
 class TransportBug:
     """A named deliberate error: how it gets into renderers, what it looks like, what it breaks, and who sees it.
 
-    `wrong` makes the integrals that err.  `caught_by` are names of `CHECKS`; the tests measure them anew.
+    `wrong` makes the integrals that err.  `caught_by` names those of `CHECKS` that see it in a scene that suits
+    it, and the tests measure that anew; the others stayed silent there.
     """
 
     name: str
@@ -20,7 +21,22 @@ class TransportBug:
     symptom: str
     breaks: str
     wrong: Callable[[Tracer], Image]
-    caught_by: tuple[str, ...] = ()
+    caught_by: tuple[str, ...]
+
+
+CHECKS: Mapping[str, str] = MappingProxyType(
+    {
+        "round trip": "T_ji(T_ij(x)) = x, F and all, and J_ij J_ji = 1",
+        "re-tracing": "the tracer, given the primary sample u^y of y = T(x), finds y and what it carries",
+        "finite differences": "J = |det du^y / du^x|",
+        "change of variables": "E_x[p_hat(Tx) J W h(Tx)] = E_y[p_hat(y) W 1{T^-1 y defined} h(y)], h Talbot's weight in"
+        " bins of J, reconnection index, length and technique",
+        "spread over pixels": "standard deviation over pixels of the z-score of what reuse adds: 1 without bias",
+        "mean of the image": "z of what reuse adds to the whole image",
+        "disoccluded pixels": "z of what reuse adds to the pixels that the previous frame did not see",
+    }
+)
+"""What one can hold against a transport: the first three path by path, the others over many samples."""
 
 
 def family(bugs: Iterable[TransportBug]) -> Mapping[str, TransportBug]:

@@ -72,6 +72,7 @@ SAMPLE_BUGS = (
         "bright and dark ghosts, smeared edges, light that lags behind",
         "[GRIS Eq. 44, 45]",
         AsItIs,
+        ("re-tracing", "finite differences", "spread over pixels", "mean of the image"),
     ),
     TransportBug(
         "target without visibility",
@@ -80,6 +81,7 @@ SAMPLE_BUGS = (
         "dark penumbras and contact shadows",
         "[GRIS Eq. 35; App. B]",
         Unoccluded,
+        ("spread over pixels", "mean of the image"),
     ),
 )
 
@@ -91,6 +93,7 @@ HISTORY_BUGS = (
         "dark trails where something has moved away, right while nothing moves",
         "[GRIS Eq. 35; 6.3, App. B]",
         PathIntegrals,
+        ("disoccluded pixels",),
     ),
 )
 """`wrong` is right, but in the wrong place: given the current tracer, it stands for the previous frame's integrals."""

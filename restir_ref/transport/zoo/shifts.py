@@ -71,10 +71,11 @@ def bsdf_kept(d: int, x: End, y: End) -> Array:
 SHIFT_BUGS = (
     TransportBug(
         "geometric Jacobian left out",
-        "Reservoirs are reused as they are: the weight was right for light samples, which need no Jacobian.",
+        "The code has reused light samples so far, which need no Jacobian; then paths came.",
         "bright and dark where neighbours see different distances: corners, contacts, depth edges",
         "[GRIS Eq. 19, 52]",
         partial(Rescaled, factor=left_out),
+        ("finite differences", "change of variables", "spread over pixels"),
     ),
     TransportBug(
         "inverted path Jacobian",
@@ -82,6 +83,7 @@ SHIFT_BUGS = (
         "bright and dark where neighbours see different distances, more than without a Jacobian",
         "[GRIS Eq. 52, 54]",
         partial(Rescaled, factor=inverted),
+        ("finite differences", "change of variables", "spread over pixels", "mean of the image"),
     ),
     TransportBug(
         "distance to the power of another dimension",
@@ -89,6 +91,7 @@ SHIFT_BUGS = (
         "bright and dark near corners and contacts, where distances differ most",
         "[GRIS Eq. 52]",
         partial(Rescaled, factor=other_power),
+        ("finite differences", "change of variables", "spread over pixels"),
     ),
     TransportBug(
         "distances swapped",
@@ -96,6 +99,7 @@ SHIFT_BUGS = (
         "bright and dark near corners and contacts, where distances differ most",
         "[GRIS Eq. 52]",
         partial(Rescaled, factor=distances_swapped),
+        ("finite differences", "change of variables", "spread over pixels", "mean of the image"),
     ),
     TransportBug(
         "cosines left out of the Jacobian",
@@ -103,6 +107,7 @@ SHIFT_BUGS = (
         "bright and dark where light arrives at grazing angles",
         "[GRIS Eq. 52]",
         partial(Rescaled, factor=no_cosines),
+        ("finite differences", "spread over pixels"),
     ),
     TransportBug(
         "lobe probability left out of the Jacobian",
@@ -110,29 +115,33 @@ SHIFT_BUGS = (
         "bright and dark outlines between materials of different lobes",
         "[GRIS Eq. 50, 54]",
         partial(Rescaled, factor=no_lobe_probability),
+        ("finite differences", "spread over pixels"),
     ),
     TransportBug(
         "second density ratio left out",
         "The direction leaving the reconnection vertex stays the same, so its density seems to cancel; yet it depends"
         " on the direction arriving.",
-        "bright and dark where glossy surfaces are seen through one more bounce",
+        "nothing to be seen; glossy surfaces behind one more bounce are off by less than the noise",
         "[GRIS Eq. 54]",
         partial(Rescaled, factor=no_second_density),
+        ("finite differences",),
     ),
     TransportBug(
         "light density of the base path kept",
         "A BSDF sample has met a light; its MIS weight is stored with the path, though the light's density as seen"
         " from the new vertex differs.",
-        "bright and dark close to lights",
+        "slightly bright and dark close to lights",
         "[GRIS Eq. 49; 7.6]",
         partial(Misvalued, factor=light_density_kept),
+        ("round trip", "re-tracing", "change of variables", "spread over pixels"),
     ),
     TransportBug(
         "MIS weight of the base path kept",
         "The end of the path is copied with its MIS weight, which depends on the direction arriving before it.",
-        "bright and dark close to lights and on glossy surfaces",
+        "slightly bright and dark close to lights and on glossy surfaces",
         "[GRIS Eq. 49; 7.6]",
         partial(Misvalued, factor=mis_weight_kept),
+        ("round trip", "re-tracing", "change of variables"),
     ),
     TransportBug(
         "BSDF beyond the connection kept",
@@ -140,33 +149,38 @@ SHIFT_BUGS = (
         "bright and dark wherever glossy surfaces are lit indirectly",
         "[GRIS 7.6, 9.3]",
         partial(Misvalued, factor=bsdf_kept),
+        ("round trip", "re-tracing", "spread over pixels"),
     ),
     TransportBug(
         "no test for an earlier connection",
         "The offset path replays to the index where the base path reconnects, though it could have reconnected before.",
-        "bright and dark next to glossy surfaces",
+        "slightly bright and dark next to glossy surfaces",
         "[GRIS 7.4, 7.6]",
         partial(Loosened, before=never_early),
+        ("re-tracing", "spread over pixels"),
     ),
     TransportBug(
         "connection tested for the base path only",
         "Roughness and distance are tested where the base path is recorded, and not again where it is shifted to.",
-        "fireflies, bright and dark on glossy surfaces and in corners",
+        "fireflies on glossy surfaces and in corners, hardly anything else",
         "[GRIS 7.3, 7.5]",
         partial(Loosened, at=anything_goes),
+        ("re-tracing",),
     ),
     TransportBug(
         "connection through walls",
         "The visibility ray of the reconnection is saved, and the copied radiance shines through what is between.",
-        "bright light leaks, worse with every pass",
+        "bright light leaks, dark beside them",
         "[GRIS 7.2]",
         partial(Loosened, at=through_walls),
+        ("re-tracing", "change of variables", "spread over pixels"),
     ),
     TransportBug(
         "large Jacobians refused one way",
         "Shifts with a large Jacobian are refused against fireflies; their inverses, whose Jacobian is small, pass.",
-        "dark or bright bands where distances change",
+        "dark where distances change, bright beside it, fewer fireflies",
         "[GRIS Def. 4.2, Eq. 35]",
         partial(Refused, allowed=small),
+        ("round trip", "change of variables", "spread over pixels", "mean of the image"),
     ),
 )
