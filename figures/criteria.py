@@ -148,6 +148,12 @@ def ratio_above(errors: ArrayLike, others: ArrayLike, limit: float) -> Outcome:
     return Outcome(text, f"ratio > {limit:g} at 95%", bool(low > limit))
 
 
+def ratio_within(errors: ArrayLike, others: ArrayLike, low: float, high: float) -> Outcome:
+    """mean(errors) / mean(others) in [low, high] with its whole bootstrap 95% interval; paired replicates (R,)."""
+    least, most, text = ratio_interval(errors, others)
+    return Outcome(text, f"ratio in [{low:g}, {high:g}] at 95%", bool(low <= least and most <= high))
+
+
 def ratio_interval(errors: ArrayLike, others: ArrayLike) -> tuple[float, float, str]:
     """(low, high, text) of mean(errors) / mean(others), bootstrapped over paired replicates (R,), R >= 8."""
     a, b = np.asarray(errors, dtype=float), np.asarray(others, dtype=float)

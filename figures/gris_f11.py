@@ -50,7 +50,7 @@ def check(a: Arrays) -> list[Claim]:
     for T in (1, longest(a)):
         claims += [against_tracing(a, T, method) for method in METHODS[1:]]
         hybrid, other = (errors(a, "cornell", offline.after(a, "cornell", m, T)) for m in ("hybrid", "reconnection"))
-        alike = criteria.between(hybrid.mean() / other.mean(), 0.7, 1.3)
+        alike = criteria.ratio_within(hybrid, other, 0.7, 1.3)
         claims.append(Claim("GRIS-F11a", alike, f"hybrid / reconnection, {T} frames", reason=REASON))
         glossy = {m: errors(a, "glossy_cornell", offline.after(a, "glossy_cornell", m, T)) for m in METHODS[1:]}
         better = criteria.ratio_below(glossy["hybrid"], glossy["reconnection"], 0.85)

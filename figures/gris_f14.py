@@ -27,7 +27,7 @@ GROUPS, EPS = 64, 0.005
 
 def chunks(preset: Any) -> Sequence[dict[str, str]]:
     """Every method behind the door, and path reuse in the box."""
-    return [*offline.chunks([SCENE], list(LABELS)), *offline.chunks([BOX], ["path reuse"])]
+    return [*offline.chunks((SCENE,), list(LABELS)), *offline.chunks((BOX,), ("path reuse",))]
 
 
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:

@@ -12,6 +12,8 @@ from figures.figure import verdict_of
 from figures.registry import faults
 from restir_ref import Live, Pixels, initial, shade
 from restir_ref.oracle.zoo import exact_bias
+from restir_ref.transport.judge import judge
+from restir_ref.transport.shift_checks import Effort
 from tests.checkout import ROOT
 from toy1d import Line
 
@@ -30,7 +32,7 @@ def skeletons() -> Any:
 
 def test_every_skeleton_is_announced_by_a_marker():
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    assert page.count("```python\n") == len(re.findall(r"<!-- skeleton: .+ -->\n```python\n", page)) == 6
+    assert page.count("```python\n") == len(re.findall(r"<!-- skeleton: .+ -->\n```python\n", page)) == 7
 
 
 def test_the_weight_passes_its_law_and_the_twin_fails_it(skeletons):
@@ -57,6 +59,18 @@ def test_the_shift_returns_and_its_jacobian_is_its_derivative(skeletons):
     np.testing.assert_allclose(back.x, x)
     np.testing.assert_allclose(back.J * y.J, 1)
     np.testing.assert_allclose(difference / (2 * h), y.J, rtol=1e-6)
+
+
+def test_the_path_shifts_are_acquitted_and_a_refusal_one_way_is_not(skeletons):
+    def careless(t, x, pixel):
+        y, J = skeletons.shift_path(t, x, pixel)
+        return y, np.where(J <= 2, J, 0.0)
+
+    def red(of):
+        return judge(of, Live(np.random.default_rng(1)), Effort(paths=5000, jacobians=60)).red
+
+    assert red(skeletons.TURNED) == red(skeletons.CAREFUL) == ()
+    assert "defined back" in red(skeletons.Shifting(skeletons.tracer, careless))
 
 
 def test_the_bug_is_biased_where_the_right_loop_is_not(skeletons):

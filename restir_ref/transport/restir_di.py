@@ -43,7 +43,8 @@ class LightSample:
 class LightIntegrals:
     """I = int over lights of f |cos_1| |cos_y| / r^(d-1) V L_e dA at given x_1, one per column of v and T (C, N).
 
-    Delta lobes have no part in it.
+    Delta lobes have no part in it.  Hazard: points on lights are the only candidates, and where lights touch
+    what they light their variance is infinite.
     """
 
     scene: Scene

@@ -200,3 +200,12 @@ def test_an_image_and_its_blocks_are_means_of_neighbouring_pixels():
     assert criteria.mean_and_blocks([image, 2 * image], 2).tolist() == [[7.5, 3.5, 11.5], [15, 7, 23]]
     with pytest.raises(ValueError, match="17 blocks need as many pixels, but the image has 16"):
         criteria.mean_and_blocks(image, 17)
+
+
+def test_a_ratio_lies_within_bounds_only_with_its_whole_interval():
+    rng = np.random.default_rng(1)
+    others = rng.normal(1, 0.1, 400)
+    equal = others + rng.normal(0, 0.1, 400)
+    assert criteria.ratio_within(equal, others, 0.9, 1.1).passed
+    assert not criteria.ratio_within(1.08 * equal, others, 0.92, 1.08).passed
+    assert not criteria.ratio_within(equal[:8] * np.array([9, 0, 0, 0, 0, 0, 0, 0]), others[:8], 0.9, 1.1).passed

@@ -16,7 +16,7 @@ from flatland2d.motion import Motion, motion, sources
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs
-from restir_ref.loop import random_in_row
+from restir_ref.loop import Preset, frame, random_in_row, spread_in_row
 from restir_ref.restir import initial, shade, spatial, temporal
 from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
@@ -243,3 +243,21 @@ def rendering(scene: str, rule: str, loop: str, replicas: int, chance: Chance) -
     """The last frame of a loop."""
     how = LOOPS[loop]
     return paired(last(frames(how.camera(images(scene, rule), how.count), replicas, chance, how.passes)))
+
+
+# ---------------------------------------------------------------- averages of offline frames
+
+
+def offline(scene: str, rule: str, n: int, count: int, chance: Chance, preset: Preset) -> Paired:
+    """Independent offline frames of n pixels, beside other path trees of as many; (count, n)."""
+    here = columns(images(scene, rule, n), count)
+    X, Y = initial(here, chance, preset.trees), frame(here, chance, preset, spread_in_row)
+    base, found = (shade(each, here)[0].reshape(count, n) for each in (X, Y))
+    return Paired(found - base, base)
+
+
+def error_slope(estimates: Array, longest: int = 128) -> float:
+    """Log-log slope of the mean squared error of averages over T = 1 .. longest frames (count, n), around all."""
+    T = 2 ** np.arange(int(np.log2(longest)) + 1)
+    averages = [estimates.reshape(-1, each, estimates.shape[-1]).mean(axis=1) for each in T]
+    return float(np.polyfit(np.log(T), np.log([each.var(axis=0, ddof=1).mean() for each in averages]), 1)[0])

@@ -95,9 +95,9 @@ def test_restir_gi_agrees_with_radiosity_where_all_is_lambert() -> None:
     assert unbiased(ours, truth, eps=0.02).passed
 
 
-def glossy(system: str) -> tuple[Array, Array]:
+def glossy(system: str, batches: int) -> tuple[Array, Array]:
     """Means of the image and of eight blocks, (replicas, 9), less what their first samples deviate; truth (9,)."""
-    reused, first = map(np.concatenate, zip(*images(system, "glossy_cornell", "defensive", 40), strict=True))
+    reused, first = map(np.concatenate, zip(*images(system, "glossy_cornell", "defensive", batches), strict=True))
     truth = mean_and_blocks(first).mean(axis=0)
     return mean_and_blocks(reused - first) + truth, truth
 
@@ -105,7 +105,7 @@ def glossy(system: str) -> tuple[Array, Array]:
 @pytest.mark.claims("GRIS-C11", "COM-B03")
 def test_restir_gi_is_biased_on_glossy_surfaces() -> None:
     """It smears what they reflect, too bright here and too dark there; the mean of the image hardly shows it."""
-    estimates, truth = glossy("GI")
+    estimates, truth = glossy("GI", 40)
     bounds = [(-0.2, -0.01), (0.01, 0.2)]
     assert any(biased(estimates[:, b], truth[b], *each).passed for b in range(1, 9) for each in bounds)
     assert abs(estimates[:, 0].mean() / truth[0] - 1) < 0.01
@@ -113,7 +113,7 @@ def test_restir_gi_is_biased_on_glossy_surfaces() -> None:
 
 @pytest.mark.claims("GRIS-C11")
 def test_restir_pt_is_not() -> None:
-    estimates, truth = glossy("PT")
+    estimates, truth = glossy("PT", 20)
     assert all_unbiased(estimates, truth, eps=0.02).passed
 
 

@@ -10,13 +10,12 @@ from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, shade, spatial
-from restir_ref.transport.paths import Path
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.zoo import TRANSPORT_BUGS
+from tests.flatland.probes import PROBES, probes
 from tests.flatland.renderings import (
     RULES,
     Bias,
-    Stage,
     bias,
     columns,
     frames,
@@ -24,47 +23,18 @@ from tests.flatland.renderings import (
     last,
     moving,
     paired,
-    previous,
 )
 
 # ---------------------------------------------------------------- Definition 4.1, function by function
 
-FAINT = 0.1
-"""Functions are 0 where p_hat is less: 1 / p_hat, so W, has no finite variance near 0, and no sample mean would do."""
 
-
-def carries(x: Path) -> Array:
-    """Paths that are worth counting."""
-    return np.asarray(x.F.mean(axis=0) > FAINT)
-
-
-PROBES = {
-    "constant": lambda x: carries(x) * 1.0,
-    "half of the domain": lambda x: carries(x) & x.nee,
-    "p_hat": lambda x: x.F.mean(axis=0),
-    "bump": lambda x: carries(x) * np.exp(-(((x.u[0] - 0.5) / 0.35) ** 2)),
-}
-FRAMES = (1, 2, 5, 20)
-
-
-def probed(stage: Stage, probe) -> Bias:
-    """E[f(Y) W_Y] against E[f(X) W_X] of the frame's own initial samples."""
-    y, x = (probe(each.x) * each.W for each in (stage.Y, stage.X))
-    n = stage.here.of.n
-    return bias((y - x).reshape(-1, n), x.reshape(-1, n))
-
-
-def probes(of, replicas: int, rated) -> dict[tuple[int, str, str], Bias]:
-    """Every probe after every stage of some frames."""
-    stages = frames(of, replicas, Live(np.random.default_rng(11)), ("temporal", "spatial"), rated)
-    later = (stage for stage in stages if stage.frame in FRAMES and (stage.frame, stage.name) != (1, "temporal"))
-    each = (stage for stage in later if stage.name != "initial")
-    return {(s.frame, s.name, name): probed(s, probe) for s in each for name, probe in PROBES.items()}
+def chance() -> Live:
+    return Live(np.random.default_rng(11))
 
 
 @pytest.mark.claims("GRIS-E08", "GRIS-A05")
 def test_after_every_stage_the_integral_of_any_function_is_unbiased() -> None:
-    found = probes(moving(images("cornell", "hybrid"), 20, 0.002), 512, previous)
+    found = probes(moving(images("cornell", "hybrid"), 20, 0.002), 512, chance())
     assert len(found) == 4 * 7
     assert {at: each for at, each in found.items() if not each.is_none(0.02)} == {}
 
@@ -76,7 +46,7 @@ def kept(before: PathIntegrals, now: PathIntegrals) -> PathIntegrals:
 
 @pytest.mark.claims("GRIS-A05")
 def test_weights_kept_while_the_camera_moves_are_noticed() -> None:
-    found = probes(moving(images("occluders", "hybrid"), 5), 160, kept)
+    found = probes(moving(images("occluders", "hybrid"), 5), 160, chance(), kept)
     assert found[5, "temporal", "p_hat"].z > 8
     assert found[5, "temporal", "p_hat"].bias > 0.01
 

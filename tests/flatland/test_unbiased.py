@@ -10,7 +10,7 @@ from flatland2d.radiosity import render
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Shifted
-from restir_ref.loop import OFFLINE, frame, random_in_row, spread_in_row
+from restir_ref.loop import OFFLINE, random_in_row
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, shade, spatial
 from restir_ref.transport.paths import Path, radiance, trace
@@ -23,11 +23,14 @@ from tests.flatland.renderings import (
     NEIGHBOURS,
     REACH,
     RULES,
+    Paired,
     bias,
     columns,
+    error_slope,
     frames,
     images,
     last,
+    offline,
     paired,
     rendering,
     spread,
@@ -205,32 +208,21 @@ def test_shifts_refused_one_way_are_found_by_inverting_them() -> None:
 SMALL = replace(OFFLINE, trees=4, neighbours=3, radius=REACH)
 
 
-def offline(count: int) -> tuple[Array, Array]:
-    """Independent offline frames (count, 16), and independent estimates by their path trees alone."""
-    here, chance = columns(images("cornell", "hybrid", 16), count), Live(np.random.default_rng(31))
-    X, Y = initial(here, chance, SMALL.trees), frame(here, chance, SMALL, spread_in_row)
-    return tuple(shade(each, here)[0].reshape(count, -1) for each in (Y, X))
-
-
-def error_slope(images_: Array) -> float:
-    """Log-log slope of the mean squared error of averages over T = 1 .. 128 frames."""
-    T, found = 2 ** np.arange(8), []
-    for each in T:
-        means = images_.reshape(-1, each, images_.shape[-1]).mean(axis=1)
-        found.append(means.var(axis=0, ddof=1).mean())  # around the mean of all frames
-    return float(np.polyfit(np.log(T), np.log(found), 1)[0])
+def some_frames(count: int) -> Paired:
+    """So many small offline frames of 16 pixels."""
+    return offline("cornell", "hybrid", 16, count, Live(np.random.default_rng(31)), SMALL)
 
 
 @pytest.mark.claims("GRIS-A06", "GRIS-C09")
 def test_averages_of_offline_frames_are_unbiased_and_converge() -> None:
-    Y, X = offline(1024)
-    assert bias(Y - X, X).is_none(0.02)
-    assert error_slope(Y) == pytest.approx(-1, abs=0.07)
+    found = some_frames(1024)
+    assert bias(found.added, found.initial).is_none(0.02)
+    assert error_slope(found.initial + found.added) == pytest.approx(-1, abs=0.07)
 
 
 def test_frames_that_share_samples_do_not_converge_like_that() -> None:
-    Y, _ = offline(64)
-    assert error_slope(np.repeat(Y, 16, axis=0)) > -0.9
+    found = some_frames(64)
+    assert error_slope(np.repeat(found.initial + found.added, 16, axis=0)) > -0.9
 
 
 def over_bound(mis, rounds: int) -> float:

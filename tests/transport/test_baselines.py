@@ -1,6 +1,7 @@
-"""Path reuse, ReSTIR GI and ReSTIR DI know no dimension: a furnace shows its closed form, a lamp what it shows a tracer.
+"""Path reuse, ReSTIR GI and ReSTIR DI know no dimension.
 
-Lamps that touch what they light are no place for ReSTIR DI: without BSDF samples its variance is infinite.
+A furnace shows the first two its closed form.  It is no place for ReSTIR DI, which has no BSDF samples: where
+lights touch what they light its variance is infinite.  Its candidates are compared with the tracer's, one by one.
 """
 
 from collections.abc import Callable
@@ -81,7 +82,7 @@ def test_path_reuse_with_the_distances_of_3d_is_noticed_in_the_plane(monkeypatch
 
 
 def candidate_and_leaf(space: Space) -> tuple[Array, Array]:
-    """What a point on a light gives ReSTIR DI, f V / p, and path tracing with the same numbers, without its MIS weight."""
+    """f V / p of points on lights in ReSTIR DI, and in light sampling with the same numbers but no MIS weights."""
     t = Tracer(room(space, ALBEDO), Fan(space), DEPTH, RECONNECTION)
     index, table = np.arange(TILE * 64), t.scene.materials
     tree = trace(t, np.random.default_rng(2).random((t.D, len(index))), index % TILE)
