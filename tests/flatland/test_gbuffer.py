@@ -60,7 +60,7 @@ def test_all_that_see_alike_are_equally_likely() -> None:
 
 def test_random_neighbours_do_not_see_alike() -> None:
     pixel, near = steps(random_in_row)
-    assert not alike(seen("occluders"))[pixel, near].all()
+    assert not alike(seen("rack"))[pixel, near].all()
 
 
 def test_choosing_by_g_buffer_changes_no_mean() -> None:
