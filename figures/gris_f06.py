@@ -92,9 +92,8 @@ ALONE = (
     "box, where it rejects many connections."
 )
 NEARBY = (
-    "Thresholds of .25% to 5% of the scene's size all gave ratios of .85 to 1.1 here, none of them surely below 1: "
-    "in two dimensions the Jacobian of a short connection is a ratio of distances, not of their squares, and what the "
-    "test saves in noise the replayed vertex adds."
+    "Thresholds from .25% to 5% of the scene's size do not help either.  Likely reason: in two dimensions the Jacobian "
+    "of a short connection is a ratio of distances, not of their squares, and one more replayed vertex costs more."
 )
 
 

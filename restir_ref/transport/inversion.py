@@ -48,7 +48,10 @@ def connection(t: Tracer, x: Path, pixel: Array) -> Connection:
 
 
 def primary_sample(tx: Tracer, x: Path, pixel_x: Array, ty: Tracer, y: Path, pixel_y: Array) -> Array:
-    """u^y (D, N) of the offset path y of a base path x that was traced; y.u where nothing reconnects."""
+    """u^y (D, N) of the offset path y of a base path x that was traced.
+
+    It is y.u up to the connection, the lobes' inverses there, and x.u behind; y.u where nothing reconnects.
+    """
     u = np.array(y.u)
     for c in np.unique(x.c[x.c > 0]):
         columns = np.flatnonzero(x.c == c)
@@ -59,8 +62,10 @@ def primary_sample(tx: Tracer, x: Path, pixel_x: Array, ty: Tracer, y: Path, pix
 
 
 def _reconnected(t: Tracer, x: Path, u_y: Array, at_x: Connection, at_y: Connection, c: int) -> Array:
-    """y's own numbers up to y_(c-2), then those of y_(c-1) and, where a BSDF sample leaves it, of x_c."""
-    table, space, u = t.scene.materials, t.scene.space, np.array(u_y)
+    """y's own numbers up to y_(c-2); those of y_(c-1) and, where a BSDF sample leaves it, of x_c are replaced."""
+    table, space, u = t.scene.materials, t.scene.space, np.array(x.u)
+    before = t.sensor.numbers + 2 * space.d * (c - 2)
+    u[:before] = u_y[:before]
     t.lobe_number(u, c - 1)[:] = mat.choose_number(at_x.P_in, at_y.P_in, x.lobe_in, t.lobe_number(x.u, c - 1))
     local = space.to_local(at_y.v.n, at_y.w)
     t.direction_numbers(u, c - 1)[:] = mat.invert_lobe(table, space, at_y.v, x.lobe_in, local)

