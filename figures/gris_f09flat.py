@@ -1,7 +1,7 @@
 """GRIS Fig. 9 and 10 in flatland: what the M-cap does to frames of a still camera and to their mean.
 
-All caps run side by side: a column's history keeps its own cap.  Without history frames are independent.
-Rough boxes, where everything connects, so that the reconnection shift is the hybrid shift without its distance test.
+The middle 64 pixels of the rough Cornell box' inset, as many as the toy of GRIS-F09 has.  All caps run side by side: a
+column's history keeps its own cap.  Without history frames are independent.  Everything is rough enough to connect.
 """
 
 from collections import Counter
@@ -15,6 +15,7 @@ from figures import criteria, style
 from figures.figure import Arrays, Claim, Figure
 from figures.flatland import estimates, means, spatial_only, view
 from figures.references import reference
+from flatland2d import SCENES
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.integrals import Pixels, Reservoirs
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Picture
 
-SCENE = "cornell"
+SCENE, PIXELS = "cornell", 64
 CAPS = (0.0, 1.0, 5.0, 20.0, 50.0, 200.0, 1000.0, np.inf)
 SPATIAL, UNCAPPED = 0, len(CAPS) - 1
 
@@ -48,30 +49,42 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
 
 
 def scene() -> PathIntegrals:
-    """The standard inset of the rough Cornell box."""
-    return view(SCENE, RECONNECTION, Counter())
+    """The middle of the rough Cornell box' standard inset."""
+    setting = SCENES[SCENE]()
+    return view(SCENE, RECONNECTION, Counter(), setting.pinhole(PIXELS, setting.crop + margin(setting.pinhole().n)))
+
+
+def truth() -> Array:
+    """Its reference, (n,)."""
+    found = reference(SCENE).mean
+    left = margin(len(found))
+    return found[left : left + PIXELS]
+
+
+def margin(n: int) -> int:
+    """Pixels of a row of n that are left out before the middle."""
+    return (n - PIXELS) // 2
 
 
 def independent(frames: int, chance: Chance) -> Arrays:
     """relMSE of frames without history (frames,), and of means of t of them, (t, 8)."""
-    truth = reference(SCENE).mean
     images = estimates(spatial_only(REAL_TIME, random_in_row), scene(), Counter(), frames, chance).images
     t = recorded(frames // 8)
-    errors = [rel_mse(means(images, int(k)), truth)[:8] for k in t]
-    return {"frame": rel_mse(images, truth), "t": t, "mean": np.stack(errors)}
+    errors = [rel_mse(means(images, int(k)), truth())[:8] for k in t]
+    return {"frame": rel_mse(images, truth()), "t": t, "mean": np.stack(errors)}
 
 
 def chains(caps: Sequence[int], replicas: Sequence[int], frames: int, chance: Chance) -> Arrays:
     """relMSE of every frame, and of the mean of the first t frames, (t, chains); the last two frames and the mean."""
-    of, truth = scene(), reference(SCENE).mean
+    of, I = scene(), truth()
     cap = np.repeat([CAPS[k] for k in caps], replicas)
     total = last = before = np.zeros((len(cap), of.n))
     found, averaged = [], []
     for t, image in enumerate(side_by_side(of, cap, frames, chance), start=1):
         total, before, last = total + image, last, image
-        found.append(rel_mse(image, truth))
+        found.append(rel_mse(image, I))
         if t in recorded(frames):
-            averaged.append(rel_mse(total / t, truth))
+            averaged.append(rel_mse(total / t, I))
     errors = {"frame": np.stack(found), "mean": np.stack(averaged), "t": recorded(frames)}
     return errors | {"last": last, "before": before, "average": total / frames}
 
@@ -98,7 +111,7 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
     """By cap's number: errors of frames "frame.k" (t, R), late ones "late.k" (R,), and of means "mean.k"."""
     *blocks, spatial = results
     arrays: Arrays = {
-        "truth": reference(SCENE).mean,
+        "truth": truth(),
         "frame.0": spatial["frame"][None],
         "late.0": spatial["frame"],
         "mean.0": spatial["mean"],
@@ -245,7 +258,7 @@ def _means(axis: "Axes", a: Arrays) -> None:
 def _images(axis: "Axes", a: Arrays) -> None:
     rows = (a["truth"], a[f"average.{UNCAPPED}"][0], a[f"last.{UNCAPPED}"][0], a["average.3"][0], a["last.3"][0])
     shown = np.repeat(np.stack(rows), 4, axis=0)
-    axis.imshow(shown, vmin=0, vmax=1.5 * a["truth"].max(), aspect="auto", extent=(0, 128, len(rows), 0))
+    axis.imshow(shown, vmin=0, vmax=1.5 * a["truth"].max(), aspect="auto", extent=(0, PIXELS, len(rows), 0))
     labels = ("reference", "no cap, mean", "no cap, last", "cap 20, mean", "cap 20, last")
     axis.set_yticks(np.arange(len(rows)) + 0.5, labels)
     axis.grid(visible=False)
@@ -260,13 +273,13 @@ FIGURE = Figure(
     claims=("GRIS-F09a", "GRIS-F09b", "GRIS-F10"),
     presets={
         "quick": {
-            "short": {"caps": [1, 2, 4, 5], "replicas": [8, 8, 8, 8], "frames": 200, "blocks": 1},
-            "long": {"caps": [3, 6, 7], "replicas": [16, 8, 8], "frames": 1000, "blocks": 1},
+            "short": {"caps": [1, 2, 4, 5], "replicas": [16, 16, 16, 16], "frames": 200, "blocks": 1},
+            "long": {"caps": [3, 6, 7], "replicas": [16, 16, 8], "frames": 1000, "blocks": 1},
             "spatial": {"frames": 4000},
         },
         "paper": {
-            "short": {"caps": [1, 2, 4, 5], "replicas": [16, 16, 16, 16], "frames": 1000, "blocks": 2},
-            "long": {"caps": [3, 6, 7], "replicas": [16, 8, 8], "frames": 4000, "blocks": 4},
+            "short": {"caps": [1, 2, 4, 5], "replicas": [32, 32, 32, 32], "frames": 1000, "blocks": 2},
+            "long": {"caps": [3, 6, 7], "replicas": [32, 32, 16], "frames": 4000, "blocks": 4},
             "spatial": {"frames": 16_000},
         },
     },

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from benchmarks.jobs import extremes, means, references, retracing, roundtrips
+from benchmarks.jobs import extremes, means, references, retracing, roundtrips, tracing
 from benchmarks.jobs.job import Done, Job
 
 JOBS: Mapping[str, Job] = MappingProxyType(
@@ -14,6 +14,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "re-tracing": retracing.JOB,
         "extremes": extremes.JOB,
         "means": means.JOB,
+        "tracing": tracing.JOB,
     }
 )
 PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType({"references": references.publish})

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.jobs.comparing import Sums, Truth, biased, joined, judged, stored, sums
+from benchmarks.jobs.comparing import BLOCKS, Sums, Truth, biased, joined, judged, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from benchmarks.jobs.nystrom import COARSE, FINE, render
 from figures.figure import Arrays
@@ -18,7 +18,7 @@ from figures.references import reference
 from flatland2d.scenes import INSET, SCENES
 from restir_ref.batch import Array
 from restir_ref.chance import Live
-from restir_ref.integrals import Image, Pixels, Reservoirs
+from restir_ref.integrals import Pixels
 from restir_ref.loop import REAL_TIME, frame, random_in_row
 from restir_ref.mis import Weights
 from restir_ref.restir import shade
@@ -103,3 +103,51 @@ def unbiased(claims: str, what: str, found: Sums, truth: Truth) -> list[Row]:
 def certainly_biased(claims: str, what: str, found: Sums, truth: Truth) -> list[Row]:
     """By more than 1%, |z| >= 8."""
     return [biased(claims, what, found, truth, float(truth.mean.mean()), 0.01)]
+
+
+def dark_at_edges(claims: str, what: str, found: Sums, truth: Truth) -> list[Row]:
+    """Too dark by more than 1% with |z| >= 8 in the blocks of pixels where direct light changes most."""
+    change = np.abs(np.diff(truth.mean, prepend=truth.mean[0])).reshape(BLOCKS, -1).sum(axis=1)
+    edges = np.argsort(change)[-BLOCKS // 4 :]
+    part = truth.mean.reshape(BLOCKS, -1)[edges]
+    of_edges = found.blocks[:, edges].mean(axis=1)
+    error = of_edges.std(ddof=1) / np.sqrt(found.R)
+    z, bias = (of_edges.mean() - part.mean()) / error, of_edges.mean() / part.mean() - 1
+    holds, limit = bool(bias < -0.01 and z <= -8), "control: bias < -1%, z <= -8"
+    return [Row(claims, f"{what} at edges of shadows", bias, limit, holds, found.R, error / part.mean(), f"z {z:+.1f}")]
+
+
+BASELINES: Mapping[str, Baseline] = {
+    "path reuse, cornell": Baseline("COM-B02", "cornell", tiles, whole, 16, unbiased),
+    "path reuse, ajar": Baseline("COM-B02", "ajar", tiles, whole, 160, unbiased),
+    "ReSTIR GI, all Lambert": Baseline("COM-B03, GRIS-C11", "matte_cornell", stored_radiance, whole, 32, unbiased),
+    "ReSTIR GI, glossy": Baseline("COM-B03, GRIS-C11", "glossy_cornell", stored_radiance, whole, 16, certainly_biased),
+    "ReSTIR DI, 1/Z": Baseline("COM-B04", "many_lights", lights(DEBIASED["1/Z"]), direct, 16, unbiased),
+    "ReSTIR DI, Talbot": Baseline("COM-B04", "many_lights", lights(DEBIASED["talbot"]), direct, 16, unbiased),
+    "ReSTIR DI, pairwise": Baseline("COM-B04", "many_lights", lights(DEBIASED["defensive"]), direct, 16, unbiased),
+    "ReSTIR DI, 1/M": Baseline("COM-B04", "many_lights", lights(BIASED), direct, 16, dark_at_edges),
+}
+
+
+def chunks(share: float) -> Sequence[Params]:
+    """Chunk by chunk, all baselines in each."""
+    every = [(part, name) for name, each in BASELINES.items() for part in parts(each.chunks, share)]
+    return [{"of": name, "part": part} for part, name in sorted(every)]
+
+
+def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
+    """REPLICAS images."""
+    asked = BASELINES[params["of"]]
+    return stored(sums(asked.render(asked.scene, Live(rng)).reshape(REPLICAS, INSET)), "images")
+
+
+def judge(done: Done) -> Sequence[Row]:
+    """Every baseline by its own claim."""
+    rows: list[Row] = []
+    for name, asked in BASELINES.items():
+        found = joined([arrays for params, arrays in done if params["of"] == name], "images")
+        rows += asked.judge(asked.claims, f"{name}: bias against the truth", found, asked.truth(asked.scene))
+    return rows
+
+
+JOB = Job("Baselines against references and radiosity", chunks, compute, judge)

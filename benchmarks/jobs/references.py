@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.jobs.job import Done, Job, Params, Row, code, parts
+from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from benchmarks.jobs.nystrom import COARSE, FINE, is_lambert, render
 from figures.figure import Arrays
 from figures.references import PATH, Reference, fingerprint, save
@@ -68,9 +68,9 @@ def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
 
 
 def identity(params: Params) -> str:
-    """The scene, and for radiosity its code."""
+    """The scene, and for radiosity how fine it is; whatever transport becomes is tested against these references."""
     scene = fingerprint(SCENES[params["scene"]]())
-    return scene + code("benchmarks.jobs.nystrom") if params["part"] == "radiosity" else scene
+    return f"{scene} {COARSE} {FINE}" if params["part"] == "radiosity" else scene
 
 
 def traced(done: Done, scene: str) -> Reference:

@@ -1,4 +1,4 @@
-"""The change of variables as an identity of means: what one can hold against a shift as a whole.  [GRIS Eq. 7]
+"""The change of variables as an identity of means: what one can hold against a shift as a whole.  [GRIS Def. 4.2]
 
     E_x[p_hat(Tx) J W h(Tx)] = E_y[p_hat(y) W 1{T^-1 y defined} h(y)]     for every h
 
@@ -56,7 +56,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Mean:
-    """Both means over one kind of y, the standard error of their difference, how many paths, and the differences (N,)."""
+    """Both means over one kind of y, their difference's standard error, how many paths, and the differences (N,)."""
 
     name: str
     left: float

@@ -18,11 +18,12 @@ from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import Preset, frame, random_in_row, spread_in_row
 from restir_ref.restir import initial, shade, spatial, temporal
-from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
+from restir_ref.transport.paths import RECONNECTION, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.zoo import TRANSPORT_BUGS
+from tests.transport.paths import HYBRID
 
-RULES = {"hybrid": Connectability(0.2, 0.02), "reconnection": RECONNECTION}
+RULES = {"hybrid": HYBRID, "reconnection": RECONNECTION}
 NEIGHBOURS, REACH = 2, 10
 
 
@@ -63,16 +64,16 @@ def spread(added: Array) -> float:
 # ---------------------------------------------------------------- images, still and moving
 
 
-def view(scene: str, n: int = 32, x: float = 0.0) -> Pinhole:
-    """The scene's whole field of view in n pixels, from an eye moved by x."""
+def view(scene: str, n: int = 32) -> Pinhole:
+    """The scene's whole field of view in n pixels."""
     setting = SCENES[scene]()
-    return Pinhole((setting.eye[0] + x, setting.eye[1]), setting.towards, n, setting.half, 0, n)
+    return Pinhole(setting.eye, setting.towards, n, setting.half, 0, n)
 
 
-def images(scene: str, rule: str, n: int = 32, x: float = 0.0) -> PathIntegrals:
-    """The scene's pixels from there."""
+def images(scene: str, rule: str, n: int = 32) -> PathIntegrals:
+    """The scene's pixels."""
     setting = SCENES[scene]()
-    return PathIntegrals(Tracer(setting.scene, view(scene, n, x), setting.depth, RULES[rule]))
+    return PathIntegrals(Tracer(setting.scene, view(scene, n), setting.depth, RULES[rule]))
 
 
 def still(of: PathIntegrals, count: int) -> list[PathIntegrals]:

@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from flatland2d import PLANE
+from flatland2d import PLANE, SCENES
 from flatland2d.scenes import LAMP, chain, matte, room
 from flatland2d.sensors import FILM, Pinhole
 from restir_ref.batch import Array, take
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
+from restir_ref.loop import random_in_row
+from restir_ref.restir import initial, shade, spatial
 from restir_ref.transport.copies import COPIES, Copy, Copying, half_vector_stretch, mirrored_or_refracted, unit_stretch
 from restir_ref.transport.lobes import LOBES, Lobe
 from restir_ref.transport.materials import Layer, Material, Vertex
@@ -185,3 +187,22 @@ def test_copying_a_path_into_its_own_pixel_changes_nothing(name, rule):
     assert np.abs(y.J - 1)[lit].max() < 1e-9
     assert np.abs(y.x.u - x.u)[:, lit].max() < 1e-9
     assert np.abs(y.x.F / np.where(lit, x.F, 1) - 1)[:, lit].max() < 1e-6
+
+
+@pytest.mark.claims("GRIS-A21")
+@pytest.mark.parametrize("name", COPIES)
+def test_two_rounds_of_reuse_with_copies_change_no_mean(name):
+    """Differences to the same frames' initial samples; 2 tests, |z| < 4."""
+    setting, pixels, replicas = SCENES["glossy_cornell"](), 32, 1000
+    view = Pinhole(setting.eye, setting.towards, pixels, setting.half, film=pixels)
+    of = Copying(Tracer(setting.scene, view, setting.depth, HYBRID), COPIES[name])
+    here, chance = Pixels(of, np.arange(pixels * replicas)), Live(np.random.default_rng(7))
+    X = Y = initial(here, chance)
+    for _ in range(2):
+        Y = spatial(Y, here, random_in_row(of, here.index, 2, 5, chance), chance)
+    start, added = (
+        each.reshape(replicas, pixels).mean(axis=1) for each in (shade(X, here), shade(Y, here) - shade(X, here))
+    )
+    error = added.std() / np.sqrt(replicas)
+    assert error < 0.01 * start.mean()
+    assert abs(added.mean()) < 4 * error
