@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from benchmarks.jobs import extremes, means, references, retracing, roundtrips, tracing
+from benchmarks.jobs import baselines, extremes, means, offline, probes, references, retracing, roundtrips, tracing
 from benchmarks.jobs.job import Done, Job
 
 JOBS: Mapping[str, Job] = MappingProxyType(
@@ -15,6 +15,9 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "extremes": extremes.JOB,
         "means": means.JOB,
         "tracing": tracing.JOB,
+        "baselines": baselines.JOB,
+        "offline": offline.JOB,
+        "probes": probes.JOB,
     }
 )
 PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType({"references": references.publish})

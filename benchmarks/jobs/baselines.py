@@ -40,7 +40,7 @@ def tracer(scene: str) -> Tracer:
 
 def tiles(scene: str, chance: Live) -> Array:
     """Path reuse."""
-    return path_reuse(tracer(scene), INDEX % INSET, chance)[0]
+    return np.asarray(path_reuse(tracer(scene), INDEX % INSET, chance)[0])
 
 
 def stored_radiance(scene: str, chance: Live) -> Array:
@@ -49,14 +49,15 @@ def stored_radiance(scene: str, chance: Live) -> Array:
     for _ in range(FRAMES):
         Y = frame(here, chance, REAL_TIME, random_in_row, Y, [here])
     assert Y is not None
-    return shade(Y, here)[0]
+    return np.asarray(shade(Y, here)[0])
 
 
 def lights(mis: Weights) -> Callable[[str, Live], Array]:
     """ReSTIR DI, and light seen directly: the last of some frames with temporal and spatial reuse."""
 
     def rendered(scene: str, chance: Live) -> Array:
-        t, X, before = tracer(scene), None, []
+        t, X = tracer(scene), None
+        before: list[Pixels] = []
         u = chance.uniform((1, len(INDEX)))
         of = light_integrals(t, u, INDEX % INSET)
         here = Pixels(of, INDEX)
@@ -65,7 +66,7 @@ def lights(mis: Weights) -> Callable[[str, Live], Array]:
             X, before = direct_light(here, near, mis, chance, X, before), [here]
         assert X is not None
         v, _, T = first_hit(t, u, INDEX % INSET)
-        return (shade(X, here) + T * emitted(t.scene, v))[0]
+        return np.asarray((shade(X, here) + T * emitted(t.scene, v))[0])
 
     return rendered
 
@@ -121,7 +122,7 @@ BASELINES: Mapping[str, Baseline] = {
     "path reuse, cornell": Baseline("COM-B02", "cornell", tiles, whole, 16, unbiased),
     "path reuse, ajar": Baseline("COM-B02", "ajar", tiles, whole, 160, unbiased),
     "ReSTIR GI, all Lambert": Baseline("COM-B03, GRIS-C11", "matte_cornell", stored_radiance, whole, 32, unbiased),
-    "ReSTIR GI, glossy": Baseline("COM-B03, GRIS-C11", "glossy_cornell", stored_radiance, whole, 16, certainly_biased),
+    "ReSTIR GI, glossy": Baseline("COM-B03, GRIS-C11", "glossy_cornell", stored_radiance, whole, 64, certainly_biased),
     "ReSTIR DI, 1/Z": Baseline("COM-B04", "many_lights", lights(DEBIASED["1/Z"]), direct, 16, unbiased),
     "ReSTIR DI, Talbot": Baseline("COM-B04", "many_lights", lights(DEBIASED["talbot"]), direct, 16, unbiased),
     "ReSTIR DI, pairwise": Baseline("COM-B04", "many_lights", lights(DEBIASED["defensive"]), direct, 16, unbiased),

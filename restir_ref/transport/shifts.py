@@ -21,7 +21,7 @@ from restir_ref.transport.paths import (
     light_leaf,
     scatter,
 )
-from restir_ref.transport.rays import arrive, emitted, light_pdf, vertex
+from restir_ref.transport.rays import GRAZING, arrive, emitted, light_pdf, vertex
 from restir_ref.transport.vectors import norm
 
 
@@ -118,7 +118,9 @@ def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     legal = connectable(t.rule, mat.lobe_roughness(table, y.v, x.lobe_in), far, r) & (p > 0)
     p_out, E = _beyond(t, x, z, p_all, r)
     A = p * z.o[-1] / r ** (space.d - 1) * p_out
-    legal &= (A > 0) & s.visible(y.v.x, x.z)
+    legal &= (A > 0) & (np.minimum(np.abs(local[-1]), z.o[-1]) > GRAZING)
+    asked = np.flatnonzero(legal)
+    legal[asked] = s.visible(y.v.x.take(asked, axis=-1), x.z.take(asked, axis=-1))
     return y.T * weight * E, A, legal
 
 
