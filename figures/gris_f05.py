@@ -15,12 +15,12 @@ from figures import criteria, style
 from figures.figure import Arrays, Claim, Figure
 from figures.flatland import HYBRID
 from flatland2d.scenes import Setting, chain, matte
-from flatland2d.shift_pictures import leaf_path, pair, pair_in_words, shift_picture
+from flatland2d.shift_pictures import pair, pair_in_words, shift_picture
 from flatland2d.space import PLANE
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.transport import materials as mat
-from restir_ref.transport.inversion import primary_sample
+from restir_ref.transport.inversion import primary_sample, traced
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Path, Tracer, first_hit
 from restir_ref.transport.rays import arrive
@@ -68,7 +68,7 @@ def by_hand(t: Tracer, k: int) -> Path:
         local = t.scene.space.to_local(v.n, w)
         t.direction_numbers(u, i)[:] = mat.invert_lobe(t.scene.materials, t.scene.space, v, np.array([0]), local)
         v, _, _ = arrive(t.scene, v.x, w)
-    return leaf_path(t, u, here, np.array([k]), np.array([True]))
+    return traced(t, u, here, np.array([k]), np.array([True]))
 
 
 def chunks(preset: Any) -> Sequence[Any]:
@@ -89,7 +89,7 @@ def offset_from_scratch() -> Arrays:
     x = by_hand(t, 4)
     y, J = shift_path(t, x, j)
     u = primary_sample(t, x, i, t, y, j)
-    again = leaf_path(t, u, j, x.k, x.nee)
+    again = traced(t, u, j, x.k, x.nee)
     vertices = [extended_path(t, numbers, pixel, x.k, x.nee).x[:6, :, 0] for numbers, pixel in ((x.u, i), (u, j))]
     F = np.array([y.F.mean(), again.F.mean()])
     numbers = np.stack([np.stack([t.direction_numbers(each, k)[0, 0] for k in (1, 2, 3)]) for each in (x.u, u)])
@@ -101,7 +101,7 @@ def indices(N: int, chance: Live) -> tuple[Array, Array]:
     t = tracer(HYBRID)
     u, pixel = chance.uniform((t.D, N)), (chance.uniform((N,)) * 1920).astype(int)
     k, nee = 1 + (chance.uniform((N,)) * t.depth).astype(int), chance.uniform((N,)) < 0.5
-    found, x = leaf_path(t, u, pixel, k, nee), extended_path(t, u, pixel, k, nee)
+    found, x = traced(t, u, pixel, k, nee), extended_path(t, u, pixel, k, nee)
     rough, gap = roughnesses(t, x) >= HYBRID.roughness, np.linalg.norm(np.diff(x.x, axis=0), axis=1)
     last = np.where(nee, k, k + 1)
     counted = [_first(rough[:, n], gap[:, n], last[n]) for n in range(N)]

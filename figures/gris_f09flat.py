@@ -160,8 +160,8 @@ def _of_frames(a: Arrays) -> list[Claim]:
 
 
 FOOT = (
-    "The factors were set by the toy. At the foot of the box shifts between floor and side are poor, and a row has few "
-    "neighbours, so that even moderate caps soon make many pixels copies of one sample; a moderate cap is best all the same."
+    "The factors were set for the toy.  At the foot of the box floor and side are poor neighbours, and a row has few, "
+    "so that even moderate caps soon make many pixels copies of one sample.  A moderate cap is best all the same."
 )
 
 

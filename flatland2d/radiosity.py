@@ -1,26 +1,36 @@
-"""Radiosity: a deterministic reference for Lambert scenes of segments, from form factors in closed form.
+"""Radiosity: a deterministic reference for Lambert scenes of segments, with exact visibility.
 
-Segments are cut into panels of constant radiance B.  In the plane the form factor of two panels
-that see each other wholly is exact (crossed strings), and so is the light a point gets from a panel,
-(sin b - sin a) / 2; visibility is tested between quarter points, and panels shrink towards the ends
-of segments, where light changes fastest.
+Segments are cut into panels of constant radiance B.  Seen from a point, the plane falls into angles
+between ends of segments, and in each of them one segment is seen: what arrives of a panel is
+B (sin a - sin b) / 2 over those parts of it.  So all that errs is B, constant on a panel and known at its middle
+only; cuts lie where light is not smooth, and panels shrink towards them.  Errors fall like 1 / panels^2.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from restir_ref.batch import Array
+from flatland2d.sensors import Pinhole
+from restir_ref.batch import Array, take
 from restir_ref.transport.lobes import LOBES
 from restir_ref.transport.scene import Scene
-from restir_ref.transport.vectors import norm
+from restir_ref.transport.vectors import dot, norm
 
-PAIRS_AT_ONCE = 200_000
+NEARBY = 0.1
+"""Ends closer to a segment than this share of its length are felt there as its own ends are."""
+
+DIGITS = 9
+"""Cuts that agree in so many digits are one."""
+
+POINTS_AT_ONCE = 256
 
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """P panels, each one side of a piece of segment: ends a, b, middle, normal (2, P); prim, albedo, emission (P,)."""
+    """P panels, each one side of a piece of segment: ends a, b, middle, normal (2, P); prim, albedo, emission (P,).
+
+    Who looks at that side has a on the right.
+    """
 
     a: Array
     b: Array
@@ -31,8 +41,24 @@ class Panels:
     emission: Array
 
 
+@dataclass(frozen=True, eq=False)
+class View:
+    """What N points see in I intervals of s, the sine of the angle to their normals, positive on the right.
+
+    s (N, I + 1) from -1 to 1;  prim (N, I) the primitive seen, -1 for none
+    V (N, I + 1, S)  V_k(s) = length of what sees primitive k in (-1, s)
+    """
+
+    s: Array
+    prim: Array
+    V: Array
+
+
+# ---------------------------------------------------------------- panels
+
+
 def cut(scene: Scene, per_segment: int) -> Panels:
-    """`per_segment` panels on every segment, graded towards its ends (Chebyshev).
+    """`per_segment` panels on either side of every segment.
 
     Raises ValueError for circles, colours or lobes other than Lambert.
     """
@@ -40,97 +66,165 @@ def cut(scene: Scene, per_segment: int) -> Panels:
     others = (table.kind != list(LOBES).index("lambert")) & (table.colour.max(axis=0) > 0)
     if scene.radii.size or scene.C != 1 or others.any():
         raise ValueError("radiosity needs a monochrome scene of segments with Lambert lobes only.")
-    at = (1 - np.cos(np.pi * np.arange(per_segment + 1) / per_segment)) / 2
-    start, end = corners(scene)
-    ends = start[:, :, None] * (1 - at) + end[:, :, None] * at
-    a, b = (np.tile(part.reshape(2, -1), 2) for part in (ends[..., :-1], ends[..., 1:]))
-    prim = np.tile(np.repeat(np.arange(scene.S), per_segment), 2)
-    side = np.repeat([1.0, -1.0], len(prim) // 2)
-    n = scene.normals.take(prim, axis=-1) * side
-    return Panels(a, b, (a + b) / 2, n, prim, _albedo(scene, prim), scene.emission[0, prim] * (side > 0))
+    at = np.stack([graded(each, per_segment) for each in edges(scene)])
+    start, end = (corner[:, :, None] for corner in scene.corners)
+    ends = start * (1 - at) + end * at
+    a, b = (part.reshape(2, -1) for part in (ends[..., :-1], ends[..., 1:]))
+    prim, n = np.repeat(np.arange(scene.S), per_segment), np.repeat(scene.normals, per_segment, axis=1)
+    emission, both = scene.emission[0].take(prim), np.tile(prim, 2)
+    return Panels(
+        np.hstack([a, b]),
+        np.hstack([b, a]),
+        np.tile((a + b) / 2, 2),
+        np.hstack([n, -n]),
+        both,
+        albedo(scene, both),
+        np.append(emission, np.zeros_like(emission)),
+    )
 
 
-def corners(scene: Scene) -> tuple[Array, Array]:
-    """Both ends of every segment, (2, S) each, from its affine map."""
-    frames = np.linalg.inv(scene.maps.reshape(2, scene.S, 2).swapaxes(0, 1))  # columns: edge, normal
-    start = -np.einsum("sij,js->is", frames, scene.offsets.reshape(2, scene.S))
-    return start, start + frames[:, :, 0].T
+def graded(at: Array, count: int) -> Array:
+    """count + 1 places from at[0] to at[-1], more of them next to each of `at` (Chebyshev).
+
+    Every piece between two of `at` has one panel, if there are so many, and of the rest a share like its length's root.
+    """
+    pieces, roots = np.arange(len(at)), np.append(0, np.cumsum(np.sqrt(np.diff(at))))
+    upto = pieces + max(count - pieces[-1], 0) * roots / roots[-1]
+    piece = np.interp(np.arange(count + 1), np.floor(upto * count / upto[-1]), pieces)
+    part = piece % 1
+    return np.interp(piece - part + (1 - np.cos(np.pi * part)) / 2, pieces, at)
 
 
-def crossed_strings(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """F_ab->cd |ab| = (|ad| + |bc| - |ac| - |bd|) / 2 where the panels see each other wholly; (..., P)."""
-
-    def length(p: Array, q: Array) -> Array:
-        return np.asarray(np.sqrt(((p - q) ** 2).sum(axis=0)))
-
-    return np.asarray(np.abs(length(a, c) + length(b, d) - length(a, d) - length(b, c)) / 2)
+def edges(scene: Scene) -> list[Array]:
+    """Places of every segment between which its light is smooth, in order, 0 and 1 among them."""
+    found = [np.concatenate(parts) for parts in zip(feet(scene), shadows(scene), strict=True)]
+    prim, place = found[0], np.clip(np.round(found[1], DIGITS), 0, 1)
+    return [np.unique(np.append(place[prim == k], [0, 1])) for k in range(scene.S)]
 
 
-def form_factors(scene: Scene, p: Panels) -> Array:
-    """F_ij: share of what leaves panel i that arrives at panel j, one row per panel, (P, P)."""
-    F = crossed_strings(p.a[:, :, None], p.b[:, :, None], p.a[:, None], p.b[:, None]) / norm(p.b - p.a)[:, None]
-    F *= in_front(p.middle, p.n, p.middle) & in_front(p.middle, p.n, p.middle).T
-    F *= p.prim[:, None] != p.prim[None]
-    i, j = np.nonzero(F)
-    for start in range(0, len(i), PAIRS_AT_ONCE):
-        part = slice(start, start + PAIRS_AT_ONCE)
-        F[i[part], j[part]] *= seen_share(scene, p, i[part], j[part])
-    return F
+def feet(scene: Scene) -> tuple[Array, Array]:
+    """Feet of ends of segments on others nearby: primitive and place on it, (K,) each."""
+    ends, prim = np.concatenate([*scene.corners], axis=1), np.arange(scene.S)[:, None]
+    place, height, length = _on_line(scene, prim, ends[:, None])
+    k, i = np.nonzero((np.abs(height) < NEARBY * length) & (place > 0) & (place < 1))
+    return k, place[k, i]
 
 
-def seen_share(scene: Scene, p: Panels, i: Array, j: Array) -> Array:
-    """How much of panel j panel i sees: the mean over four pairs of their quarter points, (Q,)."""
-    quarters = [(s, t) for s in (0.25, 0.75) for t in (0.25, 0.75)]
-    pairs = [(p.a[:, i] * (1 - s) + p.b[:, i] * s, p.a[:, j] * (1 - t) + p.b[:, j] * t) for s, t in quarters]
-    return np.asarray(np.mean([scene.visible(x, y) for x, y in pairs], axis=0))
+def shadows(scene: Scene) -> tuple[Array, Array]:
+    """Where shadows of ends of segments end that ends of lights throw: primitive and place on it, (K,) each."""
+    lights, ends = (np.concatenate([*corners], axis=1) for corners in (scene.lights.corners, scene.corners))
+    x, y = np.repeat(lights, ends.shape[1], axis=1), np.tile(ends, lights.shape[1])
+    seen = np.flatnonzero((norm(y - x) > 0) & scene.visible(x, y))
+    y, w = y[:, seen], (y - x)[:, seen]
+    t, prim = scene.intersect(y, w)
+    met = np.isfinite(t)
+    return prim[met], _on_line(scene, prim[met], (y + np.where(met, t, 0) * w)[:, met])[0]
 
 
-def in_front(x: Array, n: Array, y: Array) -> Array:
-    """Whether y_j is on the side of n_i as seen from x_i, (P, Q)."""
-    return np.asarray(np.einsum("di,dij->ij", n, y[:, None] - x[:, :, None]) > 0)
+def _on_line(scene: Scene, prim: Array, y: Array) -> tuple[Array, Array, Array]:
+    """Place of y's foot on a segment's line as a share of it, height above it, and the segment's length."""
+    a, b = (corner.take(prim, axis=-1) for corner in scene.corners)
+    length = norm(b - a)
+    return dot(y - a, b - a) / length**2, dot(y - a, scene.normals.take(prim, axis=-1)), length
 
 
-def radiance(scene: Scene, p: Panels, bounces: int) -> Array:
-    """B after so many scattering events: B <- E + albedo F B, starting from E; (P,)."""
-    F, B = form_factors(scene, p), p.emission
-    for _ in range(bounces):
-        B = np.asarray(p.emission + p.albedo * (F @ B))
-    return B
+# ---------------------------------------------------------------- visibility
 
 
-def gather(scene: Scene, p: Panels, B: Array, x: Array, prim: Array, n: Array) -> Array:
-    """albedo sum_j B_j (sin b - sin a) / 2 at points x (2, N) of primitives, on the side of n (2, N); (N,)."""
-    facing = in_front(x, n, p.middle) & in_front(p.middle, p.n, x).T & (prim[:, None] != p.prim[None])
-    out = np.zeros(x.shape[-1])
-    for k in range(x.shape[-1]):
-        j = np.flatnonzero(facing[k])
-        seen = scene.visible(np.repeat(x[:, k : k + 1], len(j), axis=1), p.middle[:, j])
-        share = np.abs(_sine(p.b[:, j], x[:, k], n[:, k]) - _sine(p.a[:, j], x[:, k], n[:, k])) / 2
-        out[k] = (share * B[j] * seen).sum()
-    return out * _albedo(scene, prim)
+def view(scene: Scene, x: Array, n: Array) -> View:
+    """What points x (2, N) see on the side of n (2, N): one ray in each interval between ends of segments.
+
+    Hazard: segments may touch, but not cross.
+    """
+    ends = _seen_from(scene, x, n, np.concatenate([*scene.corners], axis=1))
+    s, one = _sine(ends, np.sign(ends[0])), np.ones((x.shape[-1], 1))
+    s = np.sort(np.concatenate([-one, s, one], axis=1), axis=1)
+    middle, ds = (s[:, 1:] + s[:, :-1]) / 2, np.diff(s)
+    w = scene.space.to_world(n[:, :, None], np.stack([middle, np.sqrt(np.maximum(1 - middle**2, 0))]))
+    t, prim = scene.intersect(np.repeat(x, ds.shape[1], axis=1), w.reshape(2, -1))
+    prim = np.where(np.isfinite(t), prim, -1).reshape(ds.shape)
+    V = np.zeros((*s.shape, scene.S))
+    np.cumsum(ds[..., None] * (prim[..., None] == np.arange(scene.S)), axis=1, out=V[:, 1:])
+    return View(s, prim, V)
 
 
-def _albedo(scene: Scene, prim: Array) -> Array:
+def shares(scene: Scene, p: Panels, x: Array, n: Array) -> Array:
+    """(V(s_a) - V(s_b)) / 2: how much of the light arriving at x on the side of n each panel may send, (N, P)."""
+    v = view(scene, x, n)
+    a, b = _seen_from(scene, x, n, p.a), _seen_from(scene, x, n, p.b)
+    i, j = np.nonzero((a[0] * b[1] > b[0] * a[1]) & (np.maximum(a[1], b[1]) > 0))
+    found = np.zeros(a.shape[1:])
+    found[i, j] = length_of(v, i, p.prim[j], _sine(a[:, i, j], 1)) - length_of(v, i, p.prim[j], _sine(b[:, i, j], -1))
+    return found / 2
+
+
+def length_of(v: View, i: Array, prim: Array, s: Array) -> Array:
+    """V_k(s) of points i and primitives k, linear in each interval; (Q,)."""
+    N, intervals = v.prim.shape
+    rows = v.s[:, :-1] + 4 * np.arange(N)[:, None]  # one after the other: all sines of all points ascend
+    at = np.searchsorted(rows.reshape(-1), s + 4 * i, side="right") - 1 - i * intervals
+    return np.asarray(v.V[i, at, prim] + (s - v.s[i, at]) * (v.prim[i, at] == prim))
+
+
+def _seen_from(scene: Scene, x: Array, n: Array, q: Array) -> Array:
+    """To the right and up, from points x (2, N) with normals n to points q (2, P); (2, N, P)."""
+    return scene.space.to_local(n[:, :, None], q[:, None] - x[:, :, None])
+
+
+def _sine(q: Array, beyond: Array | int) -> Array:
+    """Sine of the angle of q, (right, up), to the normal; `beyond` for what is below the horizon."""
+    return np.where(q[1] > 0, q[0] / np.maximum(norm(q), 1e-300), beyond)
+
+
+# ---------------------------------------------------------------- light
+
+
+def albedo(scene: Scene, prim: Array) -> Array:
+    """Albedo of primitives, (P,)."""
     by_material = scene.materials.colour[0].reshape(-1, scene.materials.L).sum(axis=1)
     return np.asarray(by_material[scene.material[prim]])
 
 
-def _sine(q: Array, x: Array, n: Array) -> Array:
-    """Sine of the angle of q seen from x, measured from the normal."""
-    to = q - x[:, None]
-    return np.asarray((n[1] * to[0] - n[0] * to[1]) / np.maximum(norm(to), 1e-300))
+def radiance(scene: Scene, p: Panels, bounces: int) -> Array:
+    """B after so many scattering events: B <- E + albedo F B, starting from E; (P,)."""
+    B = p.emission
+    for _ in range(bounces):
+        B = np.asarray(p.emission + gather(scene, p, B, p.middle, p.prim, p.n))
+    return B
 
 
-def render(scene: Scene, sensor: object, bounces: int, per_segment: int = 60, film: int = 16) -> Array:
-    """The image of a pinhole after `bounces` scattering events, `film` points per pixel; (n,)."""
+def gather(scene: Scene, p: Panels, B: Array, x: Array, prim: Array, n: Array) -> Array:
+    """albedo sum_j B_j (sin a - sin b) / 2 at points x (2, N) of primitives, on the side of n (2, N); (N,)."""
+    lit = np.flatnonzero(B)
+    bright, parts = take(p, lit), range(0, x.shape[-1], POINTS_AT_ONCE)
+    blocks = [np.arange(start, min(start + POINTS_AT_ONCE, x.shape[-1])) for start in parts]
+    arriving = [shares(scene, bright, x.take(k, axis=-1), n.take(k, axis=-1)) @ B[lit] for k in blocks]
+    return np.concatenate(arriving) * albedo(scene, prim)
+
+
+def render(scene: Scene, sensor: Pinhole, bounces: int, per_segment: int = 60, film: int = 16) -> Array:
+    """The image of a pinhole after `bounces` scattering events, `film` points on every smooth part of a pixel; (n,)."""
     p = cut(scene, per_segment)
     B = radiance(scene, p, bounces - 1)
-    n = sensor.n  # type: ignore[attr-defined]
-    u = np.tile((np.arange(film) + 0.5) / film, n)[None]
-    x, w, _ = sensor.ray(np.repeat(np.arange(n), film), u)  # type: ignore[attr-defined]
+    pixel, u, weight = film_points(scene, sensor, film)
+    x, w, _ = sensor.ray(pixel, u[None])
     t, prim = scene.intersect(x, w)
     normal = scene.normals.take(prim, axis=-1)
-    facing = np.where((normal * w).sum(axis=0) < 0, normal, -normal)
-    front = (normal * w).sum(axis=0) < 0
-    L = gather(scene, p, B, x + t * w, prim, facing) + scene.emission[0, prim] * front
-    return np.asarray(L.reshape(n, film).mean(axis=1))
+    front = dot(normal, w) < 0
+    L = gather(scene, p, B, x + t * w, prim, np.where(front, normal, -normal)) + scene.emission[0, prim] * front
+    return np.bincount(pixel, weight * L, sensor.n)
+
+
+def film_points(scene: Scene, sensor: Pinhole, count: int) -> tuple[Array, Array, Array]:
+    """Gauss points on the parts of pixels between which ends of segments are seen: pixel, u, weight, (K,) each."""
+    seen_at = sensor.project(np.concatenate([*scene.corners], axis=1))
+    cuts = np.unique(np.append(seen_at[(seen_at > 0) & (seen_at < sensor.n)], np.arange(sensor.n + 1)))
+    node, weight = np.polynomial.legendre.leggauss(count)
+    middle, half = (cuts[1:] + cuts[:-1]) / 2, np.diff(cuts) / 2
+    pixel = np.floor(middle).astype(int).repeat(count)
+    return pixel, (middle[:, None] + half[:, None] * node).reshape(-1) - pixel, np.outer(half, weight).reshape(-1)
+
+
+def corners(scene: Scene) -> tuple[Array, Array]:
+    """Both ends of every segment, (2, S) each."""
+    return scene.corners[0], scene.corners[1]

@@ -8,7 +8,7 @@ import numpy as np
 from flatland2d.pictures import eye, lights, measure, outline
 from flatland2d.scenes import Setting
 from restir_ref.batch import Array
-from restir_ref.transport.paths import Path, Tracer, leaves, trace
+from restir_ref.transport.paths import Path, Tracer
 from restir_ref.transport.reading import (
     ExtendedPath,
     extended_path,
@@ -18,7 +18,6 @@ from restir_ref.transport.reading import (
     positions,
     roughnesses,
 )
-from restir_ref.transport.record import record
 from restir_ref.transport.shifts import shift_path
 
 if TYPE_CHECKING:
@@ -40,15 +39,6 @@ class Pair:
     c: int
     J: float
     gain: float
-
-
-def leaf_path(t: Tracer, u: Array, pixel: Array, k: Array, nee: Array) -> Path:
-    """The record of the path that primary samples u (D, N) give as leaf (k, nee)."""
-    tree = trace(t, u, pixel)
-    F = np.zeros((t.scene.C, len(k)))
-    for at, by_light, value in leaves(tree):
-        F = np.where((k == at) & (nee == by_light), value, F)
-    return record(t, tree, k, nee, F)
 
 
 def pair(t: Tracer, path: Path, i: int, j: int) -> Pair:

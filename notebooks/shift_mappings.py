@@ -14,10 +14,11 @@ from figures.flatland import RULES
 from figures.gris_f05 import PIXEL, by_hand, corridor, tracer
 from flatland2d import SCENES
 from flatland2d.pictures import bundle_picture, scene_picture
-from flatland2d.shift_pictures import Pair, leaf_path, pair, pair_in_words, shift_picture
+from flatland2d.shift_pictures import Pair, pair, pair_in_words, shift_picture
 from notebooks.show import Table
 from restir_ref import Live, Pixels, initial
 from restir_ref.batch import Array, ratio, take
+from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import REPLAY, Path, Tracer
 from restir_ref.transport.reading import factors
 from restir_ref.transport.restir_pt import PathIntegrals
@@ -86,7 +87,7 @@ def _lit_paths(name: str, shift: str, count: int = 400) -> tuple[Tracer, Path, A
     t = Tracer(setting.scene, setting.pinhole(1920, 0), setting.depth, SHIFTS[shift])
     i, u = rng.integers(100, 1720, count), rng.random((t.D, count))
     k, nee = rng.integers(2, setting.depth + 1, count), rng.random(count) < 0.5
-    x = leaf_path(t, u, i, k, nee)
+    x = traced(t, u, i, k, nee)
     lit = np.flatnonzero(x.F.any(axis=0))
     return t, take(x, lit), i[lit]
 

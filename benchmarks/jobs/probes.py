@@ -28,7 +28,7 @@ from restir_ref.transport.restir_pt import PathIntegrals
 from tests.transport.paths import HYBRID
 
 SCENE, STEP, WATCHED = "cornell", 0.002, (1, 2, 5, 20)
-CHUNKS, REPLICAS, LATTICES, PIXELS_AT_ONCE = 32, 64, 2, 8
+CHUNKS, REPLICAS, LATTICES, PIXELS_AT_ONCE = 64, 64, 1, 8
 EPS = 0.01
 
 Probe = Callable[[Array, Array], Array]

@@ -12,6 +12,7 @@ from flatland2d.fluence import direct, fluence, fluence_map
 from flatland2d.scenes import FURNACE_ALBEDO
 from flatland2d.tone import decoded, encoded, exposure, tone, untone
 from restir_ref.batch import take
+from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import RECONNECTION, Tracer, leaves, radiance, trace
 from tests.core.stubs import live
 from tests.transport.paths import HYBRID, RULES
@@ -203,7 +204,7 @@ def lit_pairs(scene, rule, N=60, reach=60):
     t, u, i = bundle(scene, N)
     t = Tracer(t.scene, t.sensor, t.depth, RULES[rule])
     rng = np.random.default_rng(2)
-    x = shift_pictures.leaf_path(t, u, i, rng.integers(1, t.depth + 1, N), rng.random(N) < 0.5)
+    x = traced(t, u, i, rng.integers(1, t.depth + 1, N), rng.random(N) < 0.5)
     j = np.clip(i + reach, 0, t.sensor.n - 1)
     return [
         shift_pictures.pair(t, take(x, np.array([n])), int(i[n]), int(j[n])) for n in np.flatnonzero(x.F.any(axis=0))
@@ -216,7 +217,7 @@ def sees(p, a, b):
 
 def reconnects_from_scratch(p):
     """Where y reconnects if its numbers are traced in its own pixel, or after x_c if it does not before."""
-    path = shift_pictures.leaf_path(p.t, p.x.u, p.y.pixel, p.x.k, p.x.nee)
+    path = traced(p.t, p.x.u, p.y.pixel, p.x.k, p.x.nee)
     return int(path.c[0]) if p.c == 0 or 0 < path.c[0] < p.c else p.c + 1
 
 

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from restir_ref.batch import Array
+from restir_ref.transport.inversion import traced
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import Connectability, Tracer
 from restir_ref.transport.scene import Ball, scene
 from restir_ref.transport.shifts import shift_path
 from restir_ref.transport.space import Space
-from tests.transport.paths import Shifts, leaf
+from tests.transport.paths import Shifts
 from tests.transport.rooms import simplex, walls
 from tests.transport.spaces import SPACES
 
@@ -47,6 +48,6 @@ def furnished_shifts(name: str, rule: Connectability, N: int, seed: int) -> Shif
     ball = Ball((simplex(space.d).mean(axis=0) + 0.1).tolist(), 0.07, 1)
     t = Tracer(scene(space, FURNISHED[name], facets, [ball]), Places(space), 3, rule)
     i, j = rng.integers(8, size=(2, N))
-    x = leaf(t, rng.random((t.D, N)), i, rng.integers(1, 4, N), rng.random(N) < 0.5)
+    x = traced(t, rng.random((t.D, N)), i, rng.integers(1, 4, N), rng.random(N) < 0.5)
     y, J = shift_path(t, x, j)
     return Shifts(t, x, i, y, j, J)

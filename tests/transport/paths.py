@@ -6,9 +6,8 @@ import numpy as np
 
 from flatland2d.scenes import Setting
 from restir_ref.batch import Array, take
-from restir_ref.transport.inversion import primary_sample
-from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Path, Tracer, leaves, trace
-from restir_ref.transport.record import record
+from restir_ref.transport.inversion import primary_sample, traced
+from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Path, Tracer
 from restir_ref.transport.shifts import shift_path
 
 HYBRID = Connectability(0.2, 0.02)
@@ -27,15 +26,6 @@ class Shifts:
     J: Array
 
 
-def leaf(t: Tracer, u: Array, pixel: Array, k: Array, nee: Array) -> Path:
-    """The path that primary samples u give as leaf (k, nee)."""
-    tree = trace(t, u, pixel)
-    F = np.zeros((t.scene.C, len(k)))
-    for at, by_light, value in leaves(tree):
-        F = np.where((k == at) & (nee == by_light), value, F)
-    return record(t, tree, k, nee, F)
-
-
 def shifts(setting: Setting, rule: Connectability, N: int, seed: int, reach: int = 20, change=lambda t: t) -> Shifts:
     """Random leaves of random pixels of the full film and their shifts to pixels nearby; only those with light."""
     rng = np.random.default_rng(seed)
@@ -43,7 +33,7 @@ def shifts(setting: Setting, rule: Connectability, N: int, seed: int, reach: int
     i = rng.integers(reach, 1920 - reach, N)
     j = i + rng.integers(1, reach + 1, N) * rng.choice([-1, 1], N)
     k = rng.integers(1, setting.depth + 1, N)
-    x = leaf(t, rng.random((t.D, N)), i, k, rng.random(N) < 0.5)
+    x = traced(t, rng.random((t.D, N)), i, k, rng.random(N) < 0.5)
     lit = np.flatnonzero(x.F.any(axis=0))
     x, i, j = take(x, lit), i[lit], j[lit]
     y, J = shift_path(t, x, j)
@@ -59,7 +49,7 @@ def successful(s: Shifts) -> Shifts:
 def retraced(s: Shifts) -> tuple[Array, Path]:
     """u^y, and the path that tracing it from scratch finds."""
     u = primary_sample(s.t, s.x, s.i, s.t, s.y, s.j)
-    return u, leaf(s.t, u, s.j, s.x.k, s.x.nee)
+    return u, traced(s.t, u, s.j, s.x.k, s.x.nee)
 
 
 def finite_difference_jacobian(s: Shifts, h: float = 1e-6) -> tuple[Array, Array]:
@@ -71,7 +61,7 @@ def finite_difference_jacobian(s: Shifts, h: float = 1e-6) -> tuple[Array, Array
         for sign in (1, -1):
             u = s.x.u.copy()
             u[k] += sign * h
-            x = leaf(s.t, u, s.i, s.x.k, s.x.nee)
+            x = traced(s.t, u, s.i, s.x.k, s.x.nee)
             y, J = shift_path(s.t, x, s.j)
             same &= (J > 0) & (x.c == s.x.c) & (x.prim == s.x.prim)
             same &= (x.lobe_in == s.x.lobe_in) & (x.lobe_out == s.x.lobe_out) & (u[k] > 0) & (u[k] < 1)

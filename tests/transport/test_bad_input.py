@@ -7,12 +7,12 @@ import pytest
 
 from flatland2d import Pinhole
 from restir_ref.guards import whole
+from restir_ref.transport.inversion import traced
 from restir_ref.transport.materials import Layer, Material, table
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Tracer, radiance, trace
 from restir_ref.transport.scene import Ball, Facet, Scene, scene
 from restir_ref.transport.shifts import shift_path
 from tests.core.test_bad_input import Mistake, faults
-from tests.transport.paths import leaf
 from tests.transport.rooms import MATTE, room
 from tests.transport.spaces import SPACES
 
@@ -222,7 +222,7 @@ NEAR_MISSES = {
 def test_a_near_miss_is_no_mistake_and_renders(t) -> None:
     rng, pixel = np.random.default_rng(1), np.arange(400) % 8
     u, k = rng.random((t.D, 400)), np.ones(400, dtype=int)
-    y, J = shift_path(t, leaf(t, u, pixel, k, k > 0), (pixel + 1) % 8)
+    y, J = shift_path(t, traced(t, u, pixel, k, k > 0), (pixel + 1) % 8)
     for values in (radiance(trace(t, u, pixel)), y.F, J):
         assert (np.isfinite(values) & (values >= 0)).all()
 
@@ -251,7 +251,7 @@ def test_a_threshold_of_nan_would_pass_unnoticed_and_connect_nothing(rule) -> No
     """Every comparison with NaN is false: the wrong rule renders an image, so nobody would look for it."""
     object.__setattr__(nan := Connectability(0, 0), "roughness", NAN)
     u, k = np.random.default_rng(2).random((9, 400)), np.full(400, 2)
-    found, other = (leaf(replace(TRACER, rule=each), u, np.arange(400) % 8, k, k > 0) for each in (nan, rule))
+    found, other = (traced(replace(TRACER, rule=each), u, np.arange(400) % 8, k, k > 0) for each in (nan, rule))
     assert (found.F == other.F).all()
     assert (found.c == 0).all()
     assert (other.c > 0).any() == (rule is RECONNECTION)

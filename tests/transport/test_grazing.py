@@ -12,12 +12,13 @@ from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.restir import initial, shade, spatial, temporal
 from restir_ref.transport import rays
+from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import Path, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Ball, Scene, scene
 from restir_ref.transport.shifts import shift_path
 from restir_ref.transport.vectors import norm
-from tests.transport.paths import RULES, leaf
+from tests.transport.paths import RULES
 
 N = 660
 LAST = 1 - 2.0**-53
@@ -98,7 +99,7 @@ def shifted_there_and_back(setting: Setting, rule: str, sensor, seed: int = 1) -
     u = specially(rng, (t.D, N), rng.choice([1.0, 0.5, 0.1], N))
     i, k = rng.integers(0, sensor.n, N), rng.integers(0, setting.depth + 1, N)
     j = np.clip(i + rng.integers(-20, 21, N), 0, sensor.n - 1)
-    x = leaf(t, u, i, k, (rng.random(N) < 0.5) & (k > 0))
+    x = traced(t, u, i, k, (rng.random(N) < 0.5) & (k > 0))
     y, J = shift_path(t, x, j)
     back, J_back = shift_path(t, y, i)
     assert sound(x)

@@ -12,6 +12,7 @@ from flatland2d.scenes import chain, matte
 from restir_ref import Pixels
 from restir_ref.batch import Array, ratio, take
 from restir_ref.transport.copies import COPIES, Copying
+from restir_ref.transport.inversion import traced
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, Connectability, Path, Tracer, first_hit, leaves, trace
 from restir_ref.transport.rays import GRAZING
@@ -33,7 +34,7 @@ from restir_ref.transport.scene import scene as compiled
 from restir_ref.transport.shifts import shift_path
 from restir_ref.transport.vectors import normalize
 from tests.transport.furnished import FURNISHED, furnished_shifts
-from tests.transport.paths import HYBRID, RULES, Shifts, leaf, retraced, shifts, successful
+from tests.transport.paths import HYBRID, RULES, Shifts, retraced, shifts, successful
 
 every_scene = pytest.mark.parametrize("scene", SCENES)
 every_rule = pytest.mark.parametrize("rule", RULES)
@@ -156,7 +157,7 @@ def offsets(scene: str, shift: str) -> tuple[Tracer, Path, Array, Path, Array]:
     of = SHIFTS[shift](t)
     i, k = rng.integers(20, 1900, N), rng.integers(1, t.depth + 1, N)
     j = i + rng.integers(1, 20, N)
-    x = leaf(of.tracer, rng.random((t.D, N)), i, k, rng.random(N) < 0.5)
+    x = traced(of.tracer, rng.random((t.D, N)), i, k, rng.random(N) < 0.5)
     y = of.shift(x, i, Pixels(of, j))
     return of.tracer, *take((x, i, y.x, j), np.flatnonzero((y.J > 0) & x.F.any(axis=0)))
 
@@ -326,7 +327,7 @@ def glossy_glossy_rough_rough(t: Tracer) -> tuple[Path, Array, ExtendedPath]:
     """Paths whose x_1 and x_2 are glossy and whose x_3 and x_4 are not, pixels, and their vertices."""
     rng, N = np.random.default_rng(48), 3000
     pixel, k = rng.integers(100, 1820, N), rng.integers(4, 6, N)
-    x = leaf(t, rng.random((t.D, N)), pixel, k, rng.random(N) < 0.7)
+    x = traced(t, rng.random((t.D, N)), pixel, k, rng.random(N) < 0.7)
     on = extended_path(t, x.u, pixel, x.k, x.nee)
     glossy = t.scene.material[on.prim[1:5]] == 1
     wanted = glossy[0] & glossy[1] & ~glossy[2] & ~glossy[3] & x.F.any(axis=0)

@@ -1,0 +1,214 @@
+"""What a frame of ReSTIR PT costs: beside path tracing of the same pixels, in CPU time and in rays.
+
+Every number is a ratio of things measured in one run in CPU time, the median over interleaved repeats,
+beside the requirement it must meet, if there is one; paths per second depend on the machine and are beside
+a loop of matrix products.  Exits with 1 if a requirement is missed.  --profile shows where a frame's
+time goes.  Takes 20 s.
+"""
+
+import cProfile
+import pstats
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from statistics import median
+from time import process_time
+from typing import Any
+
+import numpy as np
+from bench_resampling import Row, keep_freed_memory
+
+from flatland2d.motion import motion, sources
+from flatland2d.scenes import INSET, SCENES
+from flatland2d.sensors import Pinhole
+from restir_ref.batch import Array
+from restir_ref.chance import Live
+from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.loop import REAL_TIME, frame, random_in_row
+from restir_ref.restir import initial, shade
+from restir_ref.transport.counting import CLOSEST, SHADOW, counted, rays
+from restir_ref.transport.paths import Connectability, Tracer, radiance, trace
+from restir_ref.transport.restir_pt import PathIntegrals
+
+Run = Callable[[], Any]
+
+HYBRID = Connectability(0.2, 0.02)
+COLUMNS = 64 * INSET
+SIZES = [2**k for k in range(10, 17)]
+REPEATS, SHOWN = 9, 25
+STEP = 0.002
+"""How far the moving eye goes between two frames."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Print all rows, grouped; 1 if a requirement is missed."""
+    keep_freed_memory()
+    if "--profile" in arguments:
+        return profile()
+    missed = 0
+    for title, rows in SECTIONS.items():
+        print(f"\n{title}")
+        for row in rows():
+            print(row, flush=True)
+            missed += not row.met
+    print(f"\n{missed} requirements missed" if missed else "\nall requirements met")
+    return int(missed > 0)
+
+
+def cpu(runs: Mapping[Any, Run], repeats: int = REPEATS) -> dict[Any, Array]:
+    """CPU seconds of every run, (repeats,), interleaved, forth and back, after one warm-up."""
+    for run in runs.values():
+        run()
+    forth = list(runs)
+    taken = [{name: seconds(runs[name]) for name in forth[:: (-1) ** k]} for k in range(repeats)]
+    return {name: np.array([each[name] for each in taken]) for name in runs}
+
+
+def seconds(run: Run) -> float:
+    """CPU seconds of one run."""
+    start = process_time()
+    run()
+    return process_time() - start
+
+
+def rng() -> np.random.Generator:
+    """The same random numbers for every run."""
+    return np.random.default_rng(7)
+
+
+# ---------------------------------------------------------------- a frame of many columns
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """A steady state: this frame's integrals, the previous frame's and its reservoirs, and motion vectors."""
+
+    here: Pixels
+    before: Pixels
+    Y: Reservoirs
+
+
+def tracer(scene: str, sensor: Pinhole, asked: Counter[str] | None = None) -> Tracer:
+    """The scene seen by a sensor, which counts rays if asked to."""
+    setting = SCENES[scene]()
+    seen = setting.scene if asked is None else counted(setting.scene, asked)
+    return Tracer(seen, sensor, setting.depth, HYBRID)
+
+
+def frames(scene: str, step: float, columns: int = COLUMNS, asked: Counter[str] | None = None) -> Frames:
+    """Three frames of history of an eye that moves by `step`."""
+    view = SCENES[scene]().pinhole()
+    eyes = [replace(view, eye=(view.eye[0] + step * k, view.eye[1])) for k in range(4)]
+    *past, now = (PathIntegrals(tracer(scene, eye, asked)) for eye in eyes)
+    index, chance = np.arange(columns), Live(rng())
+    Y = initial(Pixels(past[0], index), chance)
+    for then, of in pairwise(past):
+        Y = frame(Pixels(of, index), chance, REAL_TIME, random_in_row, Y, [came_from(of, then, index)])
+    return Frames(Pixels(now, index), came_from(now, past[-1], index), Y)
+
+
+def came_from(now: PathIntegrals, then: PathIntegrals, index: Array) -> Pixels:
+    """The previous frame's columns that motion vectors name."""
+    seen: Pinhole = now.tracer.sensor  # type: ignore[assignment]
+    earlier: Pinhole = then.tracer.sensor  # type: ignore[assignment]
+    return Pixels(then, sources(motion(now.tracer.scene, seen, earlier), index))
+
+
+def real_time(on: Frames) -> Array:
+    """One real-time frame: fresh samples, history, three neighbours, shading."""
+    return shade(frame(on.here, Live(rng()), REAL_TIME, random_in_row, on.Y, [on.before]), on.here)
+
+
+def traced(t: Tracer, columns: int = COLUMNS) -> Array:
+    """Plain path tracing, one tree per column."""
+    return radiance(trace(t, rng().random((t.D, columns)), np.arange(columns) % t.sensor.n))
+
+
+# ---------------------------------------------------------------- the questions
+
+
+def paths() -> Iterator[Row]:
+    """Paths per CPU-second, in words of this machine."""
+    setting, A = SCENES["cornell"](), rng().random((64, 64))
+    t = Tracer(setting.scene, setting.pinhole(), 4, HYBRID)
+    found = cpu({"paths": partial(traced, t), "products": lambda: [A @ A for _ in range(1000)]})
+    yield Row("paths per CPU-second in float64, cornell, depth 4 (aim 5e5)", COLUMNS / median(found["paths"]))
+    share = median(found["products"] / found["paths"]) * COLUMNS / 1000
+    yield Row("paths in the time of one product of 64 x 64 matrices", share)
+
+
+LIMITS = {"still": (0.0, 6.5, 4), "moving": (STEP, 8.0, 5)}
+"""Step of the eye, the limit and the aim of the ratio."""
+
+
+def frame_cost() -> Iterator[Row]:
+    """A hybrid real-time frame relative to path tracing of its pixels."""
+    for scene in ("cornell", "glossy_cornell"):
+        plain = partial(traced, tracer(scene, SCENES[scene]().pinhole()))
+        runs: dict[str, Run] = {name: partial(real_time, frames(scene, step)) for name, (step, _, _) in LIMITS.items()}
+        found = cpu({"plain": plain, **runs})
+        for name, (step, limit, aim) in LIMITS.items():
+            ratio = median(found[name] / found["plain"])
+            yield Row(f"{scene}, {name}: CPU time of a frame over path tracing (aim {aim})", ratio, most=limit)
+            yield from ray_cost(f"{scene}, {name}", scene, step)
+
+
+def ray_cost(where: str, scene: str, step: float) -> Iterator[Row]:
+    """The same in rays."""
+    asked: Counter[str] = Counter()
+    on = frames(scene, step, asked=asked)
+    asked.clear()
+    real_time(on)
+    ours = Counter(asked)
+    asked.clear()
+    traced(on.here.of.tracer)  # type: ignore[attr-defined]
+    yield Row(f"{where}: rays of a frame over those of path tracing", rays(ours) / rays(asked))
+    yield Row(f"{where}: closest-hit rays per pixel and frame", ours[CLOSEST] / COLUMNS)
+    yield Row(f"{where}: shadow rays per pixel and frame", ours[SHADOW] / COLUMNS)
+
+
+def growth() -> Iterator[Row]:
+    """Slope of log CPU time over log columns of a frame."""
+    found = cpu({n: partial(real_time, frames("cornell", 0.0, n)) for n in SIZES}, repeats=5)
+    middle = [median(found[n]) for n in SIZES]
+    exponent = np.polyfit(np.log(SIZES), np.log(middle), 1)[0]
+    yield Row(f"exponent of the CPU time of a frame in its columns, {SIZES[0]} to {SIZES[-1]}", exponent, most=1.05)
+    most, fewest = middle[-1] / SIZES[-1], middle[0] / SIZES[0]
+    yield Row("CPU time per column at the most columns, relative to the fewest", most / fewest)
+
+
+def speed() -> Iterator[Row]:
+    """COM-A08: pixel-frames per second on one core."""
+    for replicas, least in ((64, 2e4), (1, -np.inf)):
+        on = frames("cornell", STEP, replicas * INSET)
+        found = median(cpu({"frame": partial(real_time, on)})["frame"])
+        what = f"128 pixels, {replicas} replicas at once: pixel-frames per CPU-second, hybrid, moving (COM-A08)"
+        yield Row(what, replicas * INSET / found, least=least)
+
+
+def profile() -> int:
+    """Functions of a frame by their own time."""
+    for scene in ("cornell", "glossy_cornell"):
+        on = frames(scene, STEP)
+        seen = cProfile.Profile()
+        seen.enable()
+        for _ in range(5):
+            real_time(on)
+        seen.disable()
+        print(f"\n{scene}, moving")
+        pstats.Stats(seen).sort_stats("tottime").print_stats(SHOWN)
+    return 0
+
+
+SECTIONS: Mapping[str, Callable[[], Iterator[Row]]] = {
+    "Path tracing": paths,
+    f"A hybrid real-time frame of {COLUMNS} columns, 3 neighbours": frame_cost,
+    "Growth": growth,
+    "Speed": speed,
+}
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
