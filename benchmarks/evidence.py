@@ -20,10 +20,10 @@ def main(arguments: Sequence[str]) -> int:
     sys.path.insert(0, str(ROOT))
     from benchmarks.jobs import JOBS, PUBLISH  # noqa: PLC0415  (the path comes first)
     from benchmarks.jobs.job import run  # noqa: PLC0415
-    from benchmarks.jobs.report import file, measured, print_rows  # noqa: PLC0415
+    from benchmarks.jobs.report import checkout, file, measured, print_rows  # noqa: PLC0415
 
     options = parser(list(JOBS)).parse_args(arguments)
-    fine = True
+    fine, begun = True, checkout()
     for name in options.jobs or JOBS:
         done = run(name, JOBS[name], options.share, options.stored, options.processes)
         rows = JOBS[name].judge(done)
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str]) -> int:
         if not options.dry:
             if name in PUBLISH:
                 PUBLISH[name](done, options.results)
-            file(name, measured(JOBS[name], options.share, rows, done), options.results)
+            file(name, measured(JOBS[name], begun, options.share, rows, done), options.results)
     return int(not fine)
 
 

@@ -90,8 +90,8 @@ def check(a: Arrays) -> list[Claim]:
 
 
 WHY = {
-    "glossy_cornell": "Without history the gain is as large: there 18 neighbours are shifted per frame.  Under the sharp "
-    "coat, drawn beside, it is larger in real time.",
+    "glossy_cornell": "Without history the gain is as large: 18 neighbours are shifted per frame there.  Under the "
+    "sharp coat, drawn beside, it is larger in real time.",
     "ajar": "Everything is Lambert there and nothing near, so both shifts are the same.",
 }
 

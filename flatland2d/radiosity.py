@@ -1,9 +1,9 @@
 """Radiosity: a deterministic reference for Lambert scenes of segments, with exact visibility.
 
-Segments are cut into panels of constant radiance B.  Seen from a point, the plane falls into angles
-between ends of segments, and in each of them one segment is seen: what arrives of a panel is
-B (sin a - sin b) / 2 over those parts of it.  So all that errs is B, constant on a panel and known at its middle
-only; cuts lie where light is not smooth, and panels shrink towards them.  Errors fall like 1 / panels^2.
+Segments are cut into panels of constant radiance B.  Seen from a point, the plane falls into angles between ends of
+segments, in each of which one segment is seen; of a panel, B (sin a - sin b) / 2 arrives over those where it is.  All
+that errs is B, constant on a panel and known at its middle only: panels end where light is not smooth, and shrink
+towards these places.  Errors fall like 1 / panels^2; at 60 per segment they are about .01% of the image.
 """
 
 from dataclasses import dataclass
@@ -17,27 +17,25 @@ from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import dot, norm
 
 NEARBY = 0.1
-"""Ends closer to a segment than this share of its length are felt there as its own ends are."""
+"""What is closer to a segment than this share of its length makes its light change as fast as its own ends do."""
 
 DIGITS = 9
-"""Cuts that agree in so many digits are one."""
+"""Places on a segment that agree in so many digits are one."""
 
 POINTS_AT_ONCE = 256
 
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """P panels, each one side of a piece of segment: ends a, b, middle, normal (2, P); prim, albedo, emission (P,).
+    """P panels, each one side of a piece of segment: ends, a on the right of who looks at it, normal n (2, P).
 
-    Who looks at that side has a on the right.
+    prim, emission (P,)  primitive, and radiance of its own
     """
 
     a: Array
     b: Array
-    middle: Array
     n: Array
     prim: Array
-    albedo: Array
     emission: Array
 
 
@@ -45,8 +43,8 @@ class Panels:
 class View:
     """What N points see in I intervals of s, the sine of the angle to their normals, positive on the right.
 
-    s (N, I + 1) from -1 to 1;  prim (N, I) the primitive seen, -1 for none
-    V (N, I + 1, S)  V_k(s) = length of what sees primitive k in (-1, s)
+    s (N, I + 1), prim (N, I)  ends of the intervals from -1 to 1, and the primitive seen, -1 for none
+    V (N, I + 1, S)            V_k(s), the measure of the sines below s at which primitive k is seen
     """
 
     s: Array
@@ -69,18 +67,10 @@ def cut(scene: Scene, per_segment: int) -> Panels:
     at = np.stack([graded(each, per_segment) for each in edges(scene)])
     start, end = (corner[:, :, None] for corner in scene.corners)
     ends = start * (1 - at) + end * at
-    a, b = (part.reshape(2, -1) for part in (ends[..., :-1], ends[..., 1:]))
-    prim, n = np.repeat(np.arange(scene.S), per_segment), np.repeat(scene.normals, per_segment, axis=1)
-    emission, both = scene.emission[0].take(prim), np.tile(prim, 2)
-    return Panels(
-        np.hstack([a, b]),
-        np.hstack([b, a]),
-        np.tile((a + b) / 2, 2),
-        np.hstack([n, -n]),
-        both,
-        albedo(scene, both),
-        np.append(emission, np.zeros_like(emission)),
-    )
+    a, b = ends[..., :-1].reshape(2, -1), ends[..., 1:].reshape(2, -1)
+    prim = np.repeat(np.arange(scene.S), per_segment)
+    n, E = scene.normals.take(prim, axis=-1), scene.emission[0].take(prim)
+    return Panels(np.hstack([a, b]), np.hstack([b, a]), np.hstack([n, -n]), np.tile(prim, 2), np.append(E, 0 * E))
 
 
 def graded(at: Array, count: int) -> Array:
@@ -104,28 +94,28 @@ def edges(scene: Scene) -> list[Array]:
 
 def feet(scene: Scene) -> tuple[Array, Array]:
     """Feet of ends of segments on others nearby: primitive and place on it, (K,) each."""
-    ends, prim = np.concatenate([*scene.corners], axis=1), np.arange(scene.S)[:, None]
-    place, height, length = _on_line(scene, prim, ends[:, None])
-    k, i = np.nonzero((np.abs(height) < NEARBY * length) & (place > 0) & (place < 1))
+    ends, prim = np.hstack([*scene.corners]), np.arange(scene.S)[:, None]
+    place, height = _on_line(scene, prim, ends[:, None])
+    k, i = np.nonzero((np.abs(height) < NEARBY) & (place > 0) & (place < 1))
     return k, place[k, i]
 
 
 def shadows(scene: Scene) -> tuple[Array, Array]:
-    """Where shadows of ends of segments end that ends of lights throw: primitive and place on it, (K,) each."""
-    lights, ends = (np.concatenate([*corners], axis=1) for corners in (scene.lights.corners, scene.corners))
+    """Where shadows end that segments throw in the light of ends of lights: primitive and place on it, (K,) each."""
+    lights, ends = np.hstack([*scene.lights.corners]), np.hstack([*scene.corners])
     x, y = np.repeat(lights, ends.shape[1], axis=1), np.tile(ends, lights.shape[1])
-    seen = np.flatnonzero((norm(y - x) > 0) & scene.visible(x, y))
-    y, w = y[:, seen], (y - x)[:, seen]
+    lit = np.flatnonzero((norm(y - x) > 0) & scene.visible(x, y))
+    y, w = y[:, lit], (y - x)[:, lit]
     t, prim = scene.intersect(y, w)
-    met = np.isfinite(t)
-    return prim[met], _on_line(scene, prim[met], (y + np.where(met, t, 0) * w)[:, met])[0]
+    met = np.flatnonzero(np.isfinite(t))
+    return prim[met], _on_line(scene, prim[met], y[:, met] + t[met] * w[:, met])[0]
 
 
-def _on_line(scene: Scene, prim: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Place of y's foot on a segment's line as a share of it, height above it, and the segment's length."""
+def _on_line(scene: Scene, prim: Array, y: Array) -> tuple[Array, Array]:
+    """Place of y's foot on the line of a segment, and y's height above it, both as shares of its length."""
     a, b = (corner.take(prim, axis=-1) for corner in scene.corners)
     length = norm(b - a)
-    return dot(y - a, b - a) / length**2, dot(y - a, scene.normals.take(prim, axis=-1)), length
+    return dot(y - a, b - a) / length**2, dot(y - a, scene.normals.take(prim, axis=-1)) / length
 
 
 # ---------------------------------------------------------------- visibility
@@ -136,9 +126,9 @@ def view(scene: Scene, x: Array, n: Array) -> View:
 
     Hazard: segments may touch, but not cross.
     """
-    ends = _seen_from(scene, x, n, np.concatenate([*scene.corners], axis=1))
-    s, one = _sine(ends, np.sign(ends[0])), np.ones((x.shape[-1], 1))
-    s = np.sort(np.concatenate([-one, s, one], axis=1), axis=1)
+    ends = _seen_from(scene, x, n, np.hstack([*scene.corners]))
+    one = np.ones((x.shape[-1], 1))
+    s = np.sort(np.hstack([-one, _sine(ends, np.sign(ends[0])), one]), axis=1)
     middle, ds = (s[:, 1:] + s[:, :-1]) / 2, np.diff(s)
     w = scene.space.to_world(n[:, :, None], np.stack([middle, np.sqrt(np.maximum(1 - middle**2, 0))]))
     t, prim = scene.intersect(np.repeat(x, ds.shape[1], axis=1), w.reshape(2, -1))
@@ -149,20 +139,20 @@ def view(scene: Scene, x: Array, n: Array) -> View:
 
 
 def shares(scene: Scene, p: Panels, x: Array, n: Array) -> Array:
-    """(V(s_a) - V(s_b)) / 2: how much of the light arriving at x on the side of n each panel may send, (N, P)."""
+    """(V(s_a) - V(s_b)) / 2: what arrives at x on the side of n from each panel, as a share of its B; (N, P)."""
     v = view(scene, x, n)
     a, b = _seen_from(scene, x, n, p.a), _seen_from(scene, x, n, p.b)
     i, j = np.nonzero((a[0] * b[1] > b[0] * a[1]) & (np.maximum(a[1], b[1]) > 0))
     found = np.zeros(a.shape[1:])
-    found[i, j] = length_of(v, i, p.prim[j], _sine(a[:, i, j], 1)) - length_of(v, i, p.prim[j], _sine(b[:, i, j], -1))
+    found[i, j] = seen_below(v, i, p.prim[j], _sine(a[:, i, j], 1)) - seen_below(v, i, p.prim[j], _sine(b[:, i, j], -1))
     return found / 2
 
 
-def length_of(v: View, i: Array, prim: Array, s: Array) -> Array:
+def seen_below(v: View, i: Array, prim: Array, s: Array) -> Array:
     """V_k(s) of points i and primitives k, linear in each interval; (Q,)."""
-    N, intervals = v.prim.shape
-    rows = v.s[:, :-1] + 4 * np.arange(N)[:, None]  # one after the other: all sines of all points ascend
-    at = np.searchsorted(rows.reshape(-1), s + 4 * i, side="right") - 1 - i * intervals
+    N, I = v.prim.shape
+    rows = v.s[:, :-1] + 4 * np.arange(N)[:, None]  # one after the other, they ascend all along
+    at = np.searchsorted(rows.reshape(-1), s + 4 * i, side="right") - 1 - i * I
     return np.asarray(v.V[i, at, prim] + (s - v.s[i, at]) * (v.prim[i, at] == prim))
 
 
@@ -171,39 +161,33 @@ def _seen_from(scene: Scene, x: Array, n: Array, q: Array) -> Array:
     return scene.space.to_local(n[:, :, None], q[:, None] - x[:, :, None])
 
 
-def _sine(q: Array, beyond: Array | int) -> Array:
-    """Sine of the angle of q, (right, up), to the normal; `beyond` for what is below the horizon."""
-    return np.where(q[1] > 0, q[0] / np.maximum(norm(q), 1e-300), beyond)
+def _sine(q: Array, below: Array | int) -> Array:
+    """Sine of the angle of q = (right, up) to the normal; `below` where q is below the horizon."""
+    return np.where(q[1] > 0, q[0] / np.maximum(norm(q), 1e-300), below)
 
 
 # ---------------------------------------------------------------- light
-
-
-def albedo(scene: Scene, prim: Array) -> Array:
-    """Albedo of primitives, (P,)."""
-    by_material = scene.materials.colour[0].reshape(-1, scene.materials.L).sum(axis=1)
-    return np.asarray(by_material[scene.material[prim]])
 
 
 def radiance(scene: Scene, p: Panels, bounces: int) -> Array:
     """B after so many scattering events: B <- E + albedo F B, starting from E; (P,)."""
     B = p.emission
     for _ in range(bounces):
-        B = np.asarray(p.emission + gather(scene, p, B, p.middle, p.prim, p.n))
+        B = np.asarray(p.emission + gather(scene, p, B, (p.a + p.b) / 2, p.prim, p.n))
     return B
 
 
 def gather(scene: Scene, p: Panels, B: Array, x: Array, prim: Array, n: Array) -> Array:
     """albedo sum_j B_j (sin a - sin b) / 2 at points x (2, N) of primitives, on the side of n (2, N); (N,)."""
-    lit = np.flatnonzero(B)
-    bright, parts = take(p, lit), range(0, x.shape[-1], POINTS_AT_ONCE)
-    blocks = [np.arange(start, min(start + POINTS_AT_ONCE, x.shape[-1])) for start in parts]
-    arriving = [shares(scene, bright, x.take(k, axis=-1), n.take(k, axis=-1)) @ B[lit] for k in blocks]
-    return np.concatenate(arriving) * albedo(scene, prim)
+    lit, blocks = np.flatnonzero(B), np.split(np.arange(len(prim)), range(POINTS_AT_ONCE, len(prim), POINTS_AT_ONCE))
+    p = take(p, lit)
+    arriving = [shares(scene, p, x.take(k, axis=-1), n.take(k, axis=-1)) @ B[lit] for k in blocks]
+    albedo = scene.materials.colour[0].reshape(-1, scene.materials.L).sum(axis=1)
+    return np.concatenate(arriving) * albedo[scene.material[prim]]
 
 
 def render(scene: Scene, sensor: Pinhole, bounces: int, per_segment: int = 60, film: int = 16) -> Array:
-    """The image of a pinhole after `bounces` scattering events, `film` points on every smooth part of a pixel; (n,)."""
+    """The image of a pinhole after `bounces` scattering events, `film` points in each part of a pixel; (n,)."""
     p = cut(scene, per_segment)
     B = radiance(scene, p, bounces - 1)
     pixel, u, weight = film_points(scene, sensor, film)
@@ -217,7 +201,7 @@ def render(scene: Scene, sensor: Pinhole, bounces: int, per_segment: int = 60, f
 
 def film_points(scene: Scene, sensor: Pinhole, count: int) -> tuple[Array, Array, Array]:
     """Gauss points on the parts of pixels between which ends of segments are seen: pixel, u, weight, (K,) each."""
-    seen_at = sensor.project(np.concatenate([*scene.corners], axis=1))
+    seen_at = sensor.project(np.hstack([*scene.corners]))
     cuts = np.unique(np.append(seen_at[(seen_at > 0) & (seen_at < sensor.n)], np.arange(sensor.n + 1)))
     node, weight = np.polynomial.legendre.leggauss(count)
     middle, half = (cuts[1:] + cuts[:-1]) / 2, np.diff(cuts) / 2

@@ -35,12 +35,25 @@ class Measured:
     rows: list[dict[str, Any]]
 
 
-def measured(job: Job, share: float, rows: Sequence[Row], done: Done) -> Measured:
-    """Results of now."""
+@dataclass(frozen=True)
+class Checkout:
+    """The commit that is checked out, and whether files of the code differ from it."""
+
+    commit: str
+    changed: bool
+
+
+def checkout() -> Checkout:
+    """That of now: to be asked before a run, for others may commit in the meantime."""
+    return Checkout(git("rev-parse", "--short=12", "HEAD"), bool(git("status", "--porcelain", "--", *MEASURED_CODE)))
+
+
+def measured(job: Job, of: Checkout, share: float, rows: Sequence[Row], done: Done) -> Measured:
+    """Results of a run that began with a checkout."""
     return Measured(
         job.asks,
-        git("rev-parse", "--short=12", "HEAD"),
-        bool(git("status", "--porcelain", "--", *MEASURED_CODE)),
+        of.commit,
+        of.changed,
         code(job.compute.__module__),
         SEED,
         share,

@@ -17,9 +17,10 @@ from benchmarks.jobs.roundtrips import AROUND, NEAR, REACH, film, lit
 from figures.figure import Arrays
 from flatland2d.scenes import SCENES
 from restir_ref.batch import Array, take
+from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import Path, Tracer
 from restir_ref.transport.shifts import shift_path
-from tests.transport.paths import Shifts, finite_difference_jacobian, leaf, retraced, successful
+from tests.transport.paths import Shifts, finite_difference_jacobian, retraced, successful
 
 CHUNKS, TRACED, DIFFERENCED = 20, 5000, 100
 """20 chunks: 1e5 re-traced paths and 2000 finite differences per shift and scene."""
@@ -45,7 +46,7 @@ def is_logic(s: Shifts, n: int, rng: np.random.Generator) -> bool:
     """Whether the paths around column n fail as well."""
     u = np.clip(s.x.u[:, [n]] + NEAR * rng.standard_normal((len(s.x.u), AROUND)), 0, np.nextafter(1, 0))
     i, j, k, nee = (each[[n]].repeat(AROUND) for each in (s.i, s.j, s.x.k, s.x.nee))
-    around = shifted(s.t, leaf(s.t, u, i, k, nee), i, j)
+    around = shifted(s.t, traced(s.t, u, i, k, nee), i, j)
     return bool(unlike(around).sum() * 2 >= len(around.J))
 
 
@@ -63,7 +64,7 @@ def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
     setting, t = SCENES[params["scene"]](), film(SCENES[params["scene"]](), params["rule"])
     base = lit(setting, TRACED, rng)
     j = base.i + rng.integers(1, REACH + 1, TRACED) * rng.choice([-1, 1], TRACED)
-    s = shifted(t, leaf(t, base.u, base.i, base.k, base.nee), base.i, j)
+    s = shifted(t, traced(t, base.u, base.i, base.k, base.nee), base.i, j)
     off = np.flatnonzero(unlike(s))
     logic = sum(is_logic(s, int(n), rng) for n in off)
     errors, tried = differences(s)
@@ -88,7 +89,7 @@ def judge(done: Done) -> Sequence[Row]:
 
 def judged(where: str, counts: Sequence[int], errors: Array) -> list[Row]:
     """One shift on one scene."""
-    traced, edge, logic, tried = counts
+    tested, edge, logic, tried = counts
     resolved = f"{len(errors)} of {tried} resolved"
     enough = len(errors) >= 0.3 * tried
     median, worst = float(np.median(errors)) if len(errors) else np.inf, float(errors.max(initial=0))
@@ -99,7 +100,7 @@ def judged(where: str, counts: Sequence[int], errors: Array) -> list[Row]:
             logic,
             "0",
             logic == 0,
-            traced,
+            tested,
             note=f"edge cases {edge}",
         ),
         Row(

@@ -17,9 +17,10 @@ from flatland2d.scenes import INSET, SCENES, Setting
 from flatland2d.sensors import FILM
 from restir_ref.batch import Array, take
 from restir_ref.chance import Live
+from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import Path, Tracer, leaves, trace
 from restir_ref.transport.shifts import shift_path
-from tests.transport.paths import RULES, leaf
+from tests.transport.paths import RULES
 
 CHUNKS, TRIPS, BATCH = 40, 25_000, 8192
 """40 * 25 000 paths with light per scene; trees at once."""
@@ -107,7 +108,7 @@ def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
         part = take(base, columns)
         for row, rule in enumerate(RULES):
             t = film(setting, rule)
-            count, bad = tally(t, leaf(t, part.u, part.i, part.k, part.nee), part.i, j[columns], rng)
+            count, bad = tally(t, traced(t, part.u, part.i, part.k, part.nee), part.i, j[columns], rng)
             counts[row] += count
             worst[row] = np.maximum(worst[row], bad)
     return {"counts": counts, "worst": worst}
@@ -131,7 +132,7 @@ def is_logic(t: Tracer, x: Path, i: int, j: int, rng: np.random.Generator) -> bo
     D = len(x.u)
     u = np.clip(x.u + NEAR * rng.standard_normal((D, AROUND)), 0, np.nextafter(1, 0))
     here, there = np.full(AROUND, i), np.full(AROUND, j)
-    near = leaf(t, u, here, x.k.repeat(AROUND), x.nee.repeat(AROUND))
+    near = traced(t, u, here, x.k.repeat(AROUND), x.nee.repeat(AROUND))
     lit = np.flatnonzero(near.F.any(axis=0))
     found = trips(t, take(near, lit), here[lit], there[lit])
     failed = np.logical_or.reduce(list(found.failures.values()))

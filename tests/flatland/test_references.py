@@ -1,0 +1,137 @@
+"""References of flatland: every scene of today has one, it is what path tracing finds, and never a stale one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.jobs.nystrom import Fineness, is_lambert, render
+from benchmarks.jobs.references import moved
+from figures import references
+from figures.errors import FigureError
+from figures.references import Reference, fingerprint, reference, save
+from flatland2d import SCENES
+from flatland2d.scenes import FURNACE_ALBEDO, INSET
+from restir_ref.transport import paths
+from restir_ref.transport.paths import RECONNECTION, Tracer
+
+every_scene = pytest.mark.parametrize("scene", SCENES)
+LAMBERT = [scene for scene, setting in SCENES.items() if is_lambert(setting().scene)]
+
+
+@every_scene
+def test_every_scene_has_a_reference_whose_mean_is_known_to_a_thousandth(scene) -> None:
+    found = reference(scene)
+    assert found.mean.shape == found.error.shape == (INSET,)
+    assert (found.mean > 0).all()
+    assert (found.error < 0.02 * found.mean).all()
+    assert found.image_error < 1e-3 * found.mean.mean()
+
+
+# ---------------------------------------------------------------- against today's code
+
+
+def z_of_path_tracing(scene: str, count: int = 16, pixels: int = 4) -> float:
+    """z of the mean of a few pixels, traced anew with `count` moved lattices."""
+    setting, rng = SCENES[scene](), np.random.default_rng(3)
+    t = Tracer(setting.scene, setting.pinhole(), setting.depth, RECONNECTION)
+    pixel = np.arange(pixels) * (INSET // pixels) + 8
+    means = np.array([moved(t, pixel, rng).mean() for _ in range(count)])
+    truth = reference(scene)
+    error = np.hypot(means.std(ddof=1) / np.sqrt(count), np.linalg.norm(truth.error[pixel]) / pixels)
+    assert error < 0.03 * truth.mean[pixel].mean()
+    return float((means.mean() - truth.mean[pixel].mean()) / error)
+
+
+@every_scene
+def test_path_tracing_finds_the_reference(scene) -> None:
+    assert abs(z_of_path_tracing(scene)) < 4.5  # t of 15 degrees of freedom, 14 scenes: false alarm .6%
+
+
+def test_light_counted_twice_is_noticed(monkeypatch) -> None:
+    """A mistake: light sampling and BSDF samples both with full weight."""
+    right = paths.ratio
+    monkeypatch.setattr(paths, "ratio", lambda a, b: np.minimum(right(a, b) + 1, 1) if a.ndim == 1 else right(a, b))
+    assert z_of_path_tracing("matte_cornell") > 8
+
+
+@pytest.mark.parametrize("scene", LAMBERT)
+def test_radiosity_with_exact_visibility_approaches_the_reference(scene) -> None:
+    setting, truth = SCENES[scene](), reference(scene).mean.mean()
+    setting_image = render(setting, setting.pinhole(), Fineness(nodes=800, cuts=64, film=3))
+    assert setting_image.mean() == pytest.approx(truth, rel=0.006)
+
+
+def test_radiosity_of_a_furnace_is_its_closed_form() -> None:
+    setting = SCENES["furnace"]()
+    truth = (1 - FURNACE_ALBEDO ** (setting.depth + 1)) / (1 - FURNACE_ALBEDO)
+    assert render(setting, setting.pinhole(4), Fineness(32, 8, 2)) == pytest.approx(truth, rel=1e-12)
+
+
+# ---------------------------------------------------------------- never a stale one
+
+
+def moved_corner(s):
+    return replace(s, scene=replace(s.scene, corners=s.scene.corners + 1e-9))
+
+
+def painted(s):
+    table = s.scene.materials
+    return replace(s, scene=replace(s.scene, materials=replace(table, colour=table.colour * 0.99)))
+
+
+def polished(s):
+    table = s.scene.materials
+    return replace(s, scene=replace(s.scene, materials=replace(table, roughness=table.roughness * 0.99)))
+
+
+CHANGES = {
+    "a corner": moved_corner,
+    "a colour": painted,
+    "roughness": polished,
+    "light": lambda s: replace(s, scene=replace(s.scene, emission=s.scene.emission * 2)),
+    "a material": lambda s: replace(s, scene=replace(s.scene, material=1 - s.scene.material)),
+    "the eye": lambda s: replace(s, eye=(s.eye[0] + 1e-9, s.eye[1])),
+    "the inset": lambda s: replace(s, crop=s.crop + 1),
+    "the field of view": lambda s: replace(s, half=0.61),
+    "the depth": lambda s: replace(s, depth=s.depth + 1),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_changed_scene_has_no_reference_and_the_message_names_the_remedy(monkeypatch, change) -> None:
+    right = SCENES["cornell"]()
+    monkeypatch.setattr(references, "SCENES", {"cornell": lambda: CHANGES[change](right)})
+    with pytest.raises(FigureError, match=r"'cornell' has changed.*make evidence ARGS=references"):
+        reference("cornell")
+
+
+def test_rounding_on_another_machine_changes_no_fingerprint() -> None:
+    right = SCENES["many_lights"]()
+    noise = 1 + 1e-15 * np.random.default_rng(1).choice([-1, 0, 1], right.scene.emission.shape)
+    assert fingerprint(
+        replace(right, scene=replace(right.scene, emission=right.scene.emission * noise))
+    ) == fingerprint(right)
+
+
+def some(error: float) -> Reference:
+    return Reference(np.ones(INSET), np.full(INSET, error), error, 1, "by hand")
+
+
+def test_what_is_stored_comes_back_and_the_better_reference_stays(tmp_path) -> None:
+    path = tmp_path / "references.npz"
+    save({"cornell": some(0.1)}, path)
+    save({"ajar": some(0.2), "cornell": some(0.3)}, path)
+    assert reference("ajar", path).error[0] == 0.2
+    assert reference("cornell", path).image_error == 0.1
+    assert reference("cornell", path).how == "by hand"
+
+
+def test_a_missing_reference_and_a_damaged_file_are_told_apart(tmp_path) -> None:
+    path = tmp_path / "references.npz"
+    with pytest.raises(FigureError, match=r"no reference of the scene 'cornell'.*make evidence"):
+        reference("cornell", path)
+    save({"cornell": some(0.1)}, path)
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(FigureError, match="cannot be used"):
+        reference("cornell", path)
