@@ -14,7 +14,6 @@ from figures.flatland import offline as one_frame
 from figures.references import reference
 from flatland2d import SCENES
 from flatland2d.gbuffer import alike, gbuffer
-from flatland2d.radiosity import corners
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels
@@ -63,7 +62,7 @@ def clearance() -> Array:
     setting = SCENES[SCENE]()
     sensor = setting.pinhole()
     v = gbuffer(setting.scene, sensor)
-    a, b = corners(setting.scene)
+    a, b = setting.scene.corners
     edge = b - a
     along = np.einsum("ds,dsn->sn", edge, v.x[:, None] - a[:, :, None]) / (edge**2).sum(axis=0)[:, None]
     nearest = a[:, :, None] + np.clip(along, 0, 1) * edge[:, :, None]

@@ -173,7 +173,7 @@ FIGURE = Figure(
     claims=("GRIS-C12",),
     presets={
         "quick": {"real time": 64, "offline": 96, "one shift": 64},
-        "paper": {"real time": 512, "offline": 1024, "one shift": 256},
+        "paper": {"real time": 256, "offline": 512, "one shift": 256},
     },
     chunks=chunks,
     compute=compute,

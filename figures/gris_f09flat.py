@@ -171,15 +171,19 @@ def ratio(errors: Array, others: Array, limit: float) -> criteria.Outcome:
     return criteria.ratio_above(errors[:R], others[:R], limit)
 
 
+MANY = 3000
+"""Frames after which a chain's mean is judged by its slope; at a tenth of 1000 it is still bending, as is drawn."""
+
+
 def _of_means(a: Arrays) -> list[Claim]:
     claims = []
     for name, k in (("spatial only", SPATIAL), ("cap 20", CAPS.index(20))):
         t, error = a[f"t_mean.{k}"], a[f"mean.{k}"].mean(axis=1)
         last = t >= t[-1] / 10
         outcome = criteria.slope_within(t[last], error[last], -1, 0.15, decades=1)
-        claims.append(
-            Claim("GRIS-F09b", outcome, f"rough Cornell box, {name}: slope of the mean's relMSE, last decade")
-        )
+        if k == SPATIAL or t[-1] >= MANY:
+            part = f"rough Cornell box, {name}: slope of the mean's relMSE, last decade"
+            claims.append(Claim("GRIS-F09b", outcome, part))
     T = np.intersect1d(a["t_mean.0"], a["t_mean.3"])[-1]
     spatial, capped = (a[f"mean.{k}"][list(a[f"t_mean.{k}"]).index(T)][:8] for k in (SPATIAL, 3))
     better = criteria.ratio_below(spatial, capped, 0.5)
@@ -284,8 +288,8 @@ FIGURE = Figure(
             "spatial": {"frames": 4000},
         },
         "paper": {
-            "short": {"caps": [1, 2, 4, 5], "replicas": [32, 32, 32, 32], "frames": 1000, "blocks": 2},
-            "long": {"caps": [3, 6, 7], "replicas": [32, 32, 16], "frames": 4000, "blocks": 4},
+            "short": {"caps": [1, 2, 4, 5], "replicas": [32, 32, 32, 32], "frames": 600, "blocks": 1},
+            "long": {"caps": [3, 6, 7], "replicas": [24, 24, 12], "frames": 3000, "blocks": 2},
             "spatial": {"frames": 16_000},
         },
     },

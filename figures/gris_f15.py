@@ -116,7 +116,7 @@ FIGURE = Figure(
     claims=("GRIS-F15",),
     presets={
         "quick": {"direct": 32, "indirect": 32, "trees": 384},
-        "paper": {"direct": 256, "indirect": 256, "trees": 3072},
+        "paper": {"direct": 128, "indirect": 128, "trees": 1536},
     },
     chunks=chunks,
     compute=compute,

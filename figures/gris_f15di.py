@@ -18,7 +18,7 @@ from figures.flatland import means, samples_of_equal_cost, view
 from figures.references import reference
 from flatland2d.radiosity import cut, gather
 from flatland2d.sensors import Pinhole
-from restir_ref.batch import Array, take
+from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import REAL_TIME, random_in_row
@@ -46,8 +46,7 @@ def direct_image(scene: Scene, sensor: Pinhole, film: int, per_lamp: int = 16) -
     u = np.tile((np.arange(film) + 0.5) / film, sensor.n)[None]
     v, _, _ = first_hit(Tracer(scene, sensor, 1, RECONNECTION), u, np.repeat(np.arange(sensor.n), film))
     panels = cut(scene, per_lamp)
-    lamps = take(panels, np.flatnonzero(panels.emission > 0))
-    arriving = gather(scene, lamps, lamps.emission, v.x, v.prim, v.n)
+    arriving = gather(scene, panels, panels.emission, v.x, v.prim, v.n)
     return np.asarray(arriving.reshape(sensor.n, film).mean(axis=1))
 
 

@@ -17,7 +17,7 @@ from flatland2d.motion import motion
 from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
-from restir_ref.transport.counting import rays
+from restir_ref.transport.counting import counted, rays
 from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
 from restir_ref.transport.restir_gi import RadianceIntegrals
 from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
@@ -32,7 +32,7 @@ MARGIN = 64
 """Pixels rendered on either side of a moving inset: about as far as anything moves in a chain."""
 
 MOTION_RAYS = 2
-"""Rays of a pixel's motion vector.  Replicas share them here; each is charged for its own."""
+"""Rays of a pixel's motion vector.  Replicas share it here, but each is charged for its own."""
 
 TREES_IN_A_FRAMES_TIME: Mapping[str, int] = MappingProxyType(
     {
@@ -96,9 +96,10 @@ def costed(views: Sequence[Traced], asked: Counter[str], replicas: int, chance: 
 
 
 def motion_vectors(of: Traced, before: Traced) -> Array:
-    """The previous pixel of every pixel, (n,)."""
-    now, then = of.tracer.sensor, before.tracer.sensor
-    return motion(of.tracer.scene, now, then).source  # type: ignore[arg-type]
+    """The previous pixel of every pixel, (n,); its rays are charged by `costed`."""
+    t = of.tracer
+    uncounted = counted(t.scene, Counter())
+    return motion(uncounted, t.sensor, before.tracer.sensor).source  # type: ignore[arg-type]
 
 
 def widened(scene: str) -> list[Pinhole]:

@@ -47,6 +47,12 @@ MODULES: tuple[str, ...] = (
     "figures.flat_scenes",
     "figures.gris_f14",
     "figures.gris_f15di",
+    "figures.gris_f01",
+    "figures.gris_f06",
+    "figures.gris_f09flat",
+    "figures.gris_f15",
+    "figures.gris_c12",
+    "figures.gris_c16",
 )
 ROOT = Path(__file__).resolve().parent.parent
 ID = re.compile(r"[A-Z][A-Z0-9]*-[A-Za-z0-9-]+")

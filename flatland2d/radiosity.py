@@ -52,9 +52,6 @@ class View:
     V: Array
 
 
-# ---------------------------------------------------------------- panels
-
-
 def cut(scene: Scene, per_segment: int) -> Panels:
     """`per_segment` panels on either side of every segment.
 
@@ -79,8 +76,8 @@ def graded(at: Array, count: int) -> Array:
     Every piece between two of `at` has one panel, if there are so many, and of the rest a share like its length's root.
     """
     pieces, roots = np.arange(len(at)), np.append(0, np.cumsum(np.sqrt(np.diff(at))))
-    upto = pieces + max(count - pieces[-1], 0) * roots / roots[-1]
-    piece = np.interp(np.arange(count + 1), np.floor(upto * count / upto[-1]), pieces)
+    upto = pieces + max(count - pieces[-1], 0) * (roots / roots[-1])
+    piece = np.interp(np.arange(count + 1), np.ceil(upto * count / upto[-1]), pieces)
     part = piece % 1
     return np.interp(piece - part + (1 - np.cos(np.pi * part)) / 2, pieces, at)
 
@@ -116,9 +113,6 @@ def _on_line(scene: Scene, prim: Array, y: Array) -> tuple[Array, Array]:
     a, b = (corner.take(prim, axis=-1) for corner in scene.corners)
     length = norm(b - a)
     return dot(y - a, b - a) / length**2, dot(y - a, scene.normals.take(prim, axis=-1)) / length
-
-
-# ---------------------------------------------------------------- visibility
 
 
 def view(scene: Scene, x: Array, n: Array) -> View:
@@ -166,9 +160,6 @@ def _sine(q: Array, below: Array | int) -> Array:
     return np.where(q[1] > 0, q[0] / np.maximum(norm(q), 1e-300), below)
 
 
-# ---------------------------------------------------------------- light
-
-
 def radiance(scene: Scene, p: Panels, bounces: int) -> Array:
     """B after so many scattering events: B <- E + albedo F B, starting from E; (P,)."""
     B = p.emission
@@ -183,7 +174,7 @@ def gather(scene: Scene, p: Panels, B: Array, x: Array, prim: Array, n: Array) -
     p = take(p, lit)
     arriving = [shares(scene, p, x.take(k, axis=-1), n.take(k, axis=-1)) @ B[lit] for k in blocks]
     albedo = scene.materials.colour[0].reshape(-1, scene.materials.L).sum(axis=1)
-    return np.concatenate(arriving) * albedo[scene.material[prim]]
+    return np.asarray(np.concatenate(arriving) * albedo[scene.material[prim]])
 
 
 def render(scene: Scene, sensor: Pinhole, bounces: int, per_segment: int = 60, film: int = 16) -> Array:
@@ -207,8 +198,3 @@ def film_points(scene: Scene, sensor: Pinhole, count: int) -> tuple[Array, Array
     middle, half = (cuts[1:] + cuts[:-1]) / 2, np.diff(cuts) / 2
     pixel = np.floor(middle).astype(int).repeat(count)
     return pixel, (middle[:, None] + half[:, None] * node).reshape(-1) - pixel, np.outer(half, weight).reshape(-1)
-
-
-def corners(scene: Scene) -> tuple[Array, Array]:
-    """Both ends of every segment, (2, S) each."""
-    return scene.corners[0], scene.corners[1]

@@ -5,9 +5,11 @@ Every law is a function that lists offenders; its twin plants one, which must be
 
 import ast
 import re
+import tokenize
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from importlib.util import resolve_name
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -188,11 +190,19 @@ EXPLAINED = re.compile(rf"\*\*\[({KEY})\]\*\*")
 
 
 def unexplained_keys(root: Path) -> list[str]:
-    """Citations in docstrings and comments whose key docs/references.md does not explain."""
+    """Citations in docstrings, comments and other strings whose key docs/references.md does not explain."""
     explained = set(EXPLAINED.findall((root / "docs" / "references.md").read_text(encoding="utf-8")))
-    texts = ((module.name, module.path.read_text(encoding="utf-8")) for module in modules(root, PACKAGES))
-    cited = {(name, key) for name, text in texts for key in CITED.findall(text)}
+    said = ((module.name, text) for module in modules(root, PACKAGES) for text in words(module))
+    cited = {(name, key) for name, text in said for key in CITED.findall(text)}
     return [f"{name} cites [{key}]" for name, key in sorted(cited) if key not in explained]
+
+
+def words(module: Module) -> Iterator[str]:
+    """What a module says: strings, docstrings among them, and comments; not the code, where [SCENE] is a list."""
+    constants = (node.value for node in ast.walk(module.tree) if isinstance(node, ast.Constant))
+    yield from (value for value in constants if isinstance(value, str))
+    tokens = tokenize.generate_tokens(StringIO(module.path.read_text(encoding="utf-8")).readline)
+    yield from (token.string for token in tokens if token.type == tokenize.COMMENT)
 
 
 def test_every_cited_key_is_explained():
@@ -202,8 +212,18 @@ def test_every_cited_key_is_explained():
 UNEXPLAINED = ("[GROS Eq. 3]", "[GROS 3.1]", "[GROS]", "[Veach 1896]", "[Veach 1896, Eq. 9]")
 
 
+SAID = {"docstring": '"""p = q.  {}"""', "comment": "x = 1  # p = q.  {}", "string": 'FIGURE = dict(source="{}")'}
+
+
+@pytest.mark.parametrize("said", SAID)
 @pytest.mark.parametrize("citation", UNEXPLAINED)
-def test_an_unexplained_key_is_noticed(tmp_path, citation):
+def test_an_unexplained_key_is_noticed(tmp_path, citation, said):
     plant(tmp_path, "docs/references.md", "- **[GRIS]** and **[Veach 1997]**")
-    plant(tmp_path, "toy1d/pixels.py", f'"""p = q.  [GRIS Eq. 1] [Veach 1997]  {citation}"""')
+    plant(tmp_path, "toy1d/pixels.py", SAID[said].format(f"[GRIS Eq. 1] [Veach 1997]  {citation}"))
     assert len(unexplained_keys(tmp_path)) == 1
+
+
+def test_code_in_brackets_is_no_citation(tmp_path):
+    plant(tmp_path, "docs/references.md", "")
+    text = 'rows = [SCENE] + [PIXEL, *rest]\nname = f"{[SCENE]} of {at[PIXEL]}"'
+    assert unexplained_keys(plant(tmp_path, "toy1d/pixels.py", text)) == []

@@ -18,6 +18,7 @@ from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted
 from restir_ref.transport import materials as mat
 from restir_ref.transport.paths import RECONNECTION, Path, Tracer, first_hit, leaves, trace
+from restir_ref.transport.rays import GRAZING
 from restir_ref.transport.record import record
 from restir_ref.transport.shifts import shift_path
 from restir_ref.transport.subtrees import behind, of_leaf, one_leaf
@@ -111,7 +112,10 @@ def _reconnected(t: Tracer, x: Stored, pixel: Array) -> tuple[Array, Array, Arra
     to = x.path.z - v.x
     r = np.maximum(norm(to), 1e-300)
     w = to / r
-    weight, p, _ = mat.scatter_lobe(table, space, v, mat.lobe_shares(table, v), x.path.lobe_in, space.to_local(v.n, w))
-    A = p * np.maximum(-dot(x.n, w), 0) / r ** (space.d - 1)
-    legal = (A > 0) & T.any(axis=0) & t.scene.visible(v.x, x.path.z)
+    local, cos = space.to_local(v.n, w), -dot(x.n, w)
+    weight, p, _ = mat.scatter_lobe(table, space, v, mat.lobe_shares(table, v), x.path.lobe_in, local)
+    A = p * np.maximum(cos, 0) / r ** (space.d - 1)
+    legal = (A > 0) & T.any(axis=0) & (np.minimum(np.abs(local[-1]), cos) > GRAZING)
+    asked = np.flatnonzero(legal)
+    legal[asked] = t.scene.visible(v.x.take(asked, axis=-1), x.path.z.take(asked, axis=-1))
     return np.where(legal, T * weight * x.L, 0.0), np.where(legal, A, 1.0), np.where(legal, ratio(A, x.path.A), 0.0)

@@ -1,21 +1,80 @@
 """Presets are the paper's; neighbours stay near, and those of the offline preset are evenly spread."""
 
+from dataclasses import asdict, dataclass
+
 import numpy as np
 import pytest
 
 from restir_ref.batch import Array
-from restir_ref.chance import Live
-from restir_ref.loop import OFFLINE, REAL_TIME, Preset, random_in_row, spread_in_row
-from restir_ref.mis import WEIGHTS
-from tests.core.stubs import Row
+from restir_ref.loop import OFFLINE, REAL_TIME, Around, random_in_row, spread_in_row
+from tests.core.stubs import live
 
-N, REACH = 2_000_000, 500_000
 AROUND = {"random": random_in_row, "spread": spread_in_row}
 each_choice = pytest.mark.parametrize("around", AROUND.values(), ids=AROUND)
 
 
+@dataclass(frozen=True)
+class Row:
+    """An image of which only the number of pixels matters."""
+
+    n: int
+
+
+def steps(around: Around, n: int, count: int, radius: int, pixel: Array, seed: int = 1) -> Array:
+    """How far the neighbours of `pixel` are away, (count, N)."""
+    found = around(Row(n), pixel, count, radius, live(seed))  # type: ignore[arg-type]
+    return np.stack([each.index for each in found]) - pixel
+
+
+def star_discrepancy(u: Array) -> Array:
+    """D* = max_k max(k / M - u_k, u_k - (k - 1) / M) for u sorted, (M, N) -> (N,)."""
+    u, k = np.sort(u, axis=0), np.arange(1, len(u) + 1)[:, None]
+    return np.asarray(np.maximum(k / len(u) - u, u - (k - 1) / len(u)).max(axis=0))
+
+
+def discrepancy_of_neighbours(around: Around) -> float:
+    """Mean D* of the offline preset's neighbours, in a row so wide that pixels hardly round them."""
+    reach, middle = 500_000, np.full(20_000, 1_000_000)
+    u = (steps(around, 2_000_001, OFFLINE.neighbours, reach, middle) + reach) / (2 * reach)
+    return float(star_discrepancy(u).mean())
+
+
 @pytest.mark.claims("GRIS-A07")
-def test_the_real_time_preset_is_the_papers() -> None:
-    assert REAL_TIME == Preset(
-        trees=1, rounds=1, neighbours=3, radius=20, cap=20, along="talbot", across="defensive"
-    )
+def test_the_real_time_preset_is_the_papers():
+    reuse = {"rounds": 1, "neighbours": 3, "radius": 20, "cap": 20}
+    assert asdict(REAL_TIME) == {"trees": 1, **reuse, "along": "talbot", "across": "defensive"}
+
+
+@pytest.mark.claims("GRIS-A08")
+def test_the_offline_preset_is_the_papers():
+    values = asdict(OFFLINE)
+    assert np.isnan(values.pop("cap"))  # there is no temporal reuse to be capped
+    reuse = {"rounds": 3, "neighbours": 6, "radius": 10}
+    assert values == {"trees": 32, **reuse, "along": "talbot", "across": "defensive"}
+
+
+@pytest.mark.claims("GRIS-A08")
+def test_spread_neighbours_have_less_discrepancy_than_random_ones():
+    random, spread = (discrepancy_of_neighbours(around) for around in (random_in_row, spread_in_row))
+    assert spread / random < 0.7
+    exact = star_discrepancy(live(2).uniform((OFFLINE.neighbours, 20_000))).mean()
+    assert abs(random / exact - 1) < 0.02  # so the random ones are what they are compared with
+
+
+def test_the_discrepancy_of_midpoints_is_the_least_and_that_of_one_corner_the_most():
+    midpoints = (np.arange(6)[:, None] + 0.5) / 6
+    assert star_discrepancy(midpoints) == pytest.approx(1 / 12)
+    assert star_discrepancy(np.zeros((6, 1))) == 1
+
+
+@each_choice
+def test_neighbours_are_all_pixels_within_the_radius_but_never_the_pixel_itself(around):
+    found = steps(around, 100, 6, 10, np.full(5000, 50))
+    assert set(found.ravel()) == set(range(-10, 11)) - {0}
+
+
+@each_choice
+def test_neighbours_stay_in_their_row_and_replica(around):
+    pixel = np.arange(4 * 30)
+    found = steps(around, 30, 6, 10, pixel) + pixel
+    assert (found // 30 == pixel // 30).all()

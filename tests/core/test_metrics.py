@@ -36,7 +36,7 @@ HAND = {
 }
 
 
-@pytest.mark.claims("COM-M01", "COM-M02", "COM-M03")
+@pytest.mark.claims("COM-M01", "COM-M02", "COM-M03", "GRIS-C14")
 @pytest.mark.parametrize("metric", HAND, ids=lambda metric: metric.__name__)
 def test_a_hand_case_has_its_value_and_leading_axes_stay(metric):
     assert metric(IMAGE, R) == pytest.approx(HAND[metric], rel=1e-12)
@@ -58,6 +58,28 @@ def test_black_pixels_divide_nothing_by_zero(metric):
 def noise(*shape: int, seed: int = 1) -> Array:
     """White noise of variance 1."""
     return np.random.default_rng(seed).standard_normal(shape)
+
+
+def squared_error(image: Array, reference: Array) -> Array:
+    """mean (I - R)^2."""
+    return np.asarray(rmse(image, reference) ** 2)
+
+
+def change_by_fireflies(metric, spread: float) -> float:
+    """Relative change of an error when one noisy pixel in a thousand is 100 times as bright; noise has mean 1."""
+    reference = np.linspace(1.0, 3.0, 100_000)
+    shape = 1 / spread**2
+    image = reference * np.random.default_rng(7).gamma(shape, 1 / shape, reference.shape)
+    fireflies = image * np.where(np.arange(len(image)) % 1000 == 0, 100, 1)
+    return float(metric(fireflies, reference) / metric(image, reference) - 1)
+
+
+@pytest.mark.claims("GRIS-C14")
+@pytest.mark.parametrize("spread", [0.05, 0.2, 1.0])
+def test_fireflies_change_mape_by_less_than_a_fiftieth_of_what_they_change_the_squared_error(spread):
+    limit = change_by_fireflies(squared_error, spread) / 50
+    assert 0 < change_by_fireflies(mape, spread) < limit
+    assert change_by_fireflies(rel_mse, spread) > limit
 
 
 # ---------------------------------------------------------------- many images of the same

@@ -1,31 +1,22 @@
-"""Path tracing against references that are not sampled: a furnace in closed form, radiosity, crossed strings."""
+"""Radiosity against closed forms, against rays, against itself refined, and path tracing against it."""
+
+from functools import cache
 
 import numpy as np
 import pytest
-from scipy.integrate import dblquad
 
-from flatland2d import SCENES
-from flatland2d.radiosity import crossed_strings, cut, form_factors, render
-from flatland2d.scenes import FURNACE_ALBEDO
+from figures.references import reference
+from flatland2d import SCENES, radiosity
+from flatland2d.radiosity import cut, gather, render, shares
+from flatland2d.scenes import FURNACE_ALBEDO, INSET, Setting
 from restir_ref.batch import Array
 from restir_ref.transport import paths
-from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
+from restir_ref.transport.paths import RECONNECTION, Tracer, trace
+from restir_ref.transport.scene import Scene
+from restir_ref.transport.vectors import dot, norm
 
-
-def replicas(setting, n: int, count: int, size: int, seed: int) -> Array:
-    """Mean images of `count` independent batches of path tracing, `size` paths per pixel each; (count, n)."""
-    rng = np.random.default_rng(seed)
-    sensor = setting.pinhole(n, 700)
-    t, pixel = Tracer(setting.scene, sensor, setting.depth, RECONNECTION), np.arange(n * size) % n
-    batches = [radiance(trace(t, rng.random((t.D, n * size)), pixel))[0] for _ in range(count)]
-    return np.array([batch.reshape(size, n).mean(axis=0) for batch in batches])
-
-
-def z_score(samples: Array, truth: float, eps: float) -> float:
-    """|mean - truth| / SE, with a power clause: SE <= eps truth."""
-    error = samples.std(ddof=1) / np.sqrt(len(samples))
-    assert error <= eps * truth
-    return float(abs(samples.mean() - truth) / error)
+LAMBERT = ("matte_cornell", "ajar", "crease", "occluders", "checker", "rack")
+every_scene = pytest.mark.parametrize("scene", LAMBERT)
 
 
 def truncated_furnace(bounces: int) -> float:
@@ -33,57 +24,190 @@ def truncated_furnace(bounces: int) -> float:
     return (1 - FURNACE_ALBEDO ** (bounces + 1)) / (1 - FURNACE_ALBEDO)
 
 
-@pytest.mark.claims("GRIS-E49", "COM-B01")
-def test_a_furnace_traces_its_closed_form() -> None:
-    setting = SCENES["furnace"]()
-    images = replicas(setting, 4, 64, 128, seed=1).mean(axis=1)
-    assert z_score(images, truncated_furnace(setting.depth), 0.003) < 4
+def points(scene: Scene, count: int, seed: int = 1) -> tuple[Array, Array]:
+    """Points at random on fronts of segments, and their normals."""
+    rng = np.random.default_rng(seed)
+    prim, t = rng.integers(scene.S, size=count), rng.random(count)
+    a, b = (corner.take(prim, axis=-1) for corner in scene.corners)
+    return a + t * (b - a), scene.normals.take(prim, axis=-1)
 
 
-def test_a_furnace_has_its_closed_form_radiosity() -> None:
+# ---------------------------------------------------------------- what is seen
+
+
+@every_scene
+def test_what_points_see_of_all_panels_is_everything(scene) -> None:
+    """The rooms are closed."""
+    s = SCENES[scene]().scene
+    assert shares(s, cut(s, 12), *points(s, 200)).sum(axis=1) == pytest.approx(1, abs=1e-9)
+
+
+RAYS = 20_000
+
+
+def met_share(scene: Scene, prims: Array, x: Array, n: Array) -> Array:
+    """Share of RAYS evenly spread sines from the point x that meet the front of each primitive."""
+    s = (np.arange(RAYS) + 0.5) / RAYS * 2 - 1
+    w = scene.space.to_world(n, np.stack([s, np.sqrt(1 - s**2)]))
+    _, prim = scene.intersect(np.repeat(x, RAYS, axis=1), w)
+    front = dot(scene.normals.take(prim, axis=-1), w) < 0
+    return np.bincount(prim[front], minlength=scene.S)[prims] / RAYS
+
+
+@every_scene
+def test_what_is_seen_of_a_segment_is_what_rays_meet(scene) -> None:
+    s, count = SCENES[scene]().scene, 5
+    x, n = points(s, 20, seed=2)
+    fronts = shares(s, cut(s, count), x, n)[:, : s.S * count].reshape(-1, s.S, count).sum(axis=2)
+    by_rays = [met_share(s, np.arange(s.S), x[:, [k]], n[:, [k]]) for k in range(20)]
+    assert np.abs(fronts - by_rays).max() < 2 * s.S / RAYS
+
+
+def crossed_strings(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """F |ab| = (|ac| + |bd| - |ad| - |bc|) / 2 for panels that see each other wholly, a and c being on the right."""
+    return np.asarray(norm(a - c) + norm(b - d) - norm(a - d) - norm(b - c)) / 2
+
+
+def test_shares_averaged_over_a_panel_are_its_form_factors_by_crossed_strings() -> None:
+    s = SCENES["furnace"]().scene
+    p = cut(s, 6)
+    node, weight = np.polynomial.legendre.leggauss(40)
+    i, j = 3, np.flatnonzero((p.emission > 0) & (p.prim > 0))
+    x = (p.a + p.b)[:, [i]] / 2 + node * (p.b - p.a)[:, [i]] / 2
+    mean = weight @ shares(s, p, x, np.repeat(p.n[:, [i]], 40, axis=1))[:, j] / 2
+    by_strings = crossed_strings(p.a[:, [i]], p.b[:, [i]], p.a[:, j], p.b[:, j]) / norm(p.b - p.a)[i]
+    assert mean == pytest.approx(by_strings, abs=1e-6)
+
+
+def test_a_furnace_has_its_closed_form() -> None:
     setting = SCENES["furnace"]()
     image = render(setting.scene, setting.pinhole(4), setting.depth, per_segment=16, film=4)
     assert image == pytest.approx(truncated_furnace(setting.depth), rel=1e-12)
 
 
-CUTS = {"checker": (20, 24, 28), "matte_cornell": range(40, 80, 4)}
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 8, 13, 21, 60])
+def test_cuts_grow_from_end_to_end_and_leave_out_places_only_where_they_are_fewer(count) -> None:
+    for scene in LAMBERT:
+        for places in radiosity.edges(SCENES[scene]().scene):
+            at = radiosity.graded(places, count)
+            assert len(at) == count + 1
+            assert (at[0], at[-1]) == (0, 1)
+            assert (np.diff(at) > 0).all()
+            assert np.isin(places, at).all() or count < len(places) - 1
 
 
-@pytest.mark.claims("COM-A01")
-@pytest.mark.parametrize("scene", CUTS)
+@every_scene
+def test_direct_light_needs_no_fine_panels(scene) -> None:
+    s = SCENES[scene]().scene
+    x, n = points(s, 50)
+    coarse, fine = (gather(s, p, p.emission, x, np.zeros(50, dtype=int), n) for p in (cut(s, 1), cut(s, 7)))
+    assert coarse == pytest.approx(fine, abs=1e-12)
+
+
+# ---------------------------------------------------------------- refined
+
+PANELS, BOUND = 60, 5e-4
+
+
+@cache
+def image(scene: str, per_segment: int) -> Array:
+    """The inset, (128,)."""
+    return rendered(SCENES[scene](), per_segment)
+
+
+def rendered(setting: Setting, per_segment: int) -> Array:
+    return render(setting.scene, setting.pinhole(), setting.depth, per_segment)
+
+
+def error_of(coarse: float, fine: float) -> float:
+    """Relative error of `fine`, found with twice the panels, if errors fall like 1 / panels^2."""
+    return abs(fine - coarse) / 3 / fine
+
+
+@every_scene
+def test_sixty_panels_per_segment_err_by_less_than_a_twentieth_of_a_per_cent(scene) -> None:
+    coarse, fine = image(scene, PANELS // 2), image(scene, PANELS)
+    assert error_of(coarse.mean(), fine.mean()) < BOUND
+    assert fine.mean() == pytest.approx(reference(scene).mean.mean(), rel=BOUND)
+
+
+@every_scene
+def test_twice_the_panels_have_a_quarter_of_the_errors_or_less(scene) -> None:
+    """Pixel by pixel, so that nothing cancels, against the radiosity or path tracing of `figures/references.npz`."""
+    truth = reference(scene)
+    floor = np.sqrt((truth.error**2).mean())
+    coarse, fine = (np.sqrt(((image(scene, n) - truth.mean) ** 2).mean()) for n in (PANELS // 3, PANELS))
+    assert fine < coarse / 4 + 2 * floor
+
+
+def by_middles(scene: Scene, p: radiosity.Panels, x: Array, n: Array) -> Array:
+    """A mistake: a panel is seen wholly where its middle is seen."""
+    middle = (p.a + p.b) / 2
+    i, j = (each.reshape(-1) for each in np.indices((x.shape[1], len(p.prim))))
+    seen = scene.visible(x[:, i], middle[:, j]) & (dot(p.n[:, j], x[:, i] - middle[:, j]) > 1e-12)
+    s_a, s_b = (radiosity._sine(radiosity._seen_from(scene, x, n, q), s) for q, s in ((p.a, 1), (p.b, -1)))
+    return np.asarray((s_a - s_b) / 2 * seen.reshape(s_a.shape))
+
+
+def test_visibility_judged_by_middles_is_noticed(monkeypatch) -> None:
+    monkeypatch.setattr(radiosity, "shares", by_middles)
+    wrong = [rendered(SCENES["crease"](), n).mean() for n in (PANELS // 2, PANELS)]
+    assert error_of(*wrong) > 2 * BOUND
+    assert abs(wrong[1] / image("crease", PANELS).mean() - 1) > 4 * BOUND
+
+
+def test_panels_that_ignore_where_light_is_not_smooth_are_noticed(monkeypatch) -> None:
+    monkeypatch.setattr(radiosity, "edges", lambda scene: [np.array([0.0, 1.0])] * scene.S)
+    wrong = rendered(SCENES["matte_cornell"](), PANELS).mean()
+    assert abs(wrong / image("matte_cornell", PANELS).mean() - 1) > 4 * BOUND
+
+
+# ---------------------------------------------------------------- path tracing
+
+BATCHES = {"matte_cornell": 64, "crease": 64, "ajar": 448}
+BATCH, EPS = INSET * 64, 0.003
+
+
+def traced(scene: str, batches: int, seed: int) -> Array:
+    """Means of independent batches of path tracing over the inset, (batches,)."""
+    setting, rng = SCENES[scene](), np.random.default_rng(seed)
+    t, pixel = Tracer(setting.scene, setting.pinhole(), setting.depth, RECONNECTION), np.arange(BATCH) % INSET
+    return np.array([paths.radiance(trace(t, rng.random((t.D, BATCH)), pixel)).mean() for _ in range(batches)])
+
+
+def z_score(samples: Array, truth: float, eps: float) -> float:
+    """(mean - truth) / SE, with a power clause: SE <= eps truth."""
+    error = samples.std(ddof=1) / np.sqrt(len(samples))
+    assert error <= eps * truth
+    return float((samples.mean() - truth) / error)
+
+
+@cache
+def path_traced(scene: str) -> Array:
+    """As many batches as a standard error of .3% takes."""
+    return traced(scene, BATCHES[scene], seed=2)
+
+
+@pytest.mark.claims("GRIS-E49", "COM-A01", "COM-B01")
+@pytest.mark.parametrize("scene", BATCHES)
 def test_path_tracing_agrees_with_radiosity(scene) -> None:
-    setting = SCENES[scene]()
-    cuts = [render(setting.scene, setting.pinhole(4, 700), setting.depth, n, film=4).mean() for n in CUTS[scene]]
-    truth = np.mean(cuts)  # shadow edges make each cut err by some .1%, at random
-    assert np.std(cuts) / np.sqrt(len(cuts)) < 0.003 / 4 * truth
-    assert z_score(replicas(setting, 4, 64, 512, seed=2).mean(axis=1), truth, 0.003) < 4
+    assert SCENES[scene]().depth == 3
+    assert abs(z_score(path_traced(scene), image(scene, PANELS).mean(), EPS)) < 4
+
+
+def test_path_tracing_tells_radiosity_by_middles_apart(monkeypatch) -> None:
+    monkeypatch.setattr(radiosity, "shares", by_middles)
+    assert abs(z_score(path_traced("crease"), rendered(SCENES["crease"](), PANELS).mean(), EPS)) > 8
+
+
+@pytest.mark.claims("GRIS-E49", "COM-B01")
+def test_a_furnace_traces_its_closed_form() -> None:
+    truth = truncated_furnace(SCENES["furnace"]().depth)
+    assert abs(z_score(traced("furnace", 16, seed=1), truth, EPS)) < 4
 
 
 def test_double_counting_light_is_caught(monkeypatch) -> None:
     """A mistake: light sampling and BSDF samples both with full weight."""
-    setting = SCENES["matte_cornell"]()
-    truth = render(setting.scene, setting.pinhole(4, 700), setting.depth, per_segment=100, film=8).mean()
     right = paths.ratio
     monkeypatch.setattr(paths, "ratio", lambda a, b: np.minimum(right(a, b) + 1, 1) if a.ndim == 1 else right(a, b))
-    images = replicas(setting, 4, 64, 128, seed=3).mean(axis=1)
-    assert images.mean() > 1.2 * truth
-
-
-def test_crossed_strings_are_the_double_integral_of_the_geometry_term() -> None:
-    a, b, c, d = (np.array(p)[:, None] for p in ((0.0, 0.0), (1.0, 0.0), (0.2, 0.7), (1.1, 0.4)))
-
-    def geometry(s: float, t: float) -> float:
-        x, y = a + t * (b - a), c + s * (d - c)
-        to = (y - x)[:, 0]
-        r = float(np.hypot(*to))
-        n = np.array([-(d - c)[1, 0], (d - c)[0, 0]]) / float(np.hypot(*(d - c)[:, 0]))
-        return float(to[1] / r * abs(n @ to) / r / (2 * r) * np.hypot(*(d - c)[:, 0]))
-
-    assert crossed_strings(a, b, c, d)[0] == pytest.approx(dblquad(geometry, 0, 1, 0, 1)[0], rel=1e-7)
-
-
-def test_form_factors_of_a_closed_room_sum_to_one() -> None:
-    panels = cut(SCENES["furnace"]().scene, 12)
-    inside = np.flatnonzero(panels.emission > 0)
-    sums = form_factors(SCENES["furnace"]().scene, panels)[np.ix_(inside, inside)].sum(axis=1)
-    assert sums == pytest.approx(1, abs=1e-9)  # differences of nearly equal lengths
+    assert z_score(traced("matte_cornell", 16, seed=3), image("matte_cornell", PANELS).mean(), 0.02) > 8

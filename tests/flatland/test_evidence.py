@@ -1,0 +1,316 @@
+"""The jobs of `make evidence`: they resume, know what they depend on, run at tiny counts, and see planted mistakes."""
+
+import json
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from benchmarks import evidence, jobs
+from benchmarks.jobs import baselines, comparing, extremes, job, means, offline, probes, report, retracing, roundtrips
+from benchmarks.jobs import tracing as tracing_job
+from benchmarks.jobs.comparing import Sums, joined, judged, nothing, spread, spread_by_chance, stored, sums
+from benchmarks.jobs.job import Job, Row, parts, run
+from benchmarks.jobs.nystrom import Fineness
+from benchmarks.jobs.references import lattice
+from benchmarks.jobs.roundtrips import Trips
+from flatland2d import SCENES
+from restir_ref.batch import take
+from restir_ref.integrals import Pixels
+from restir_ref.loop import random_in_row
+from restir_ref.transport import shifts as shifts_module
+
+# ---------------------------------------------------------------- the machine
+
+
+def counted(asked: list[int], fails_at: int = -1) -> Job:
+    """Five chunks of two random numbers; computing one is noted, one may raise."""
+
+    def compute(params, *, rng):
+        asked.append(params["part"])
+        if params["part"] == fails_at:
+            raise KeyboardInterrupt
+        return {"x": rng.random(2)}
+
+    def judge(done):
+        total = sum(arrays["x"].sum() for _, arrays in done)
+        return [Row("", "a sum", float(total), "> 0", bool(total > 0), len(done))]
+
+    return Job("A sum", lambda share: [{"part": part} for part in parts(5, share)], compute, judge, lambda _: "it")
+
+
+def test_a_run_that_was_ended_goes_on_and_finds_the_same(tmp_path) -> None:
+    asked: list[int] = []
+    with pytest.raises(KeyboardInterrupt):
+        run("job", counted(asked, fails_at=3), 1.0, tmp_path / "a")
+    resumed = run("job", counted(asked), 1.0, tmp_path / "a")
+    assert asked == [0, 1, 2, 3, 3, 4]
+    whole = run("job", counted([]), 1.0, tmp_path / "b")
+    assert all((a["x"] == b["x"]).all() for (_, a), (_, b) in zip(resumed, whole, strict=True))
+
+
+def test_a_smaller_share_is_part_of_a_larger_one(tmp_path) -> None:
+    asked: list[int] = []
+    assert len(run("job", counted(asked), 0.4, tmp_path)) == 2
+    assert len(run("job", counted(asked), 1.0, tmp_path)) == 5
+    assert asked == [0, 1, 2, 3, 4]
+
+
+def test_chunks_and_jobs_have_random_numbers_of_their_own(tmp_path) -> None:
+    done = [*run("job", counted([]), 1.0, tmp_path), *run("other", counted([]), 1.0, tmp_path)]
+    assert len({arrays["x"][0] for _, arrays in done}) == len(done)
+
+
+@pytest.mark.parametrize("change", ["another dependence", "a damaged file"])
+def test_what_no_longer_holds_is_computed_again(tmp_path, change) -> None:
+    asked: list[int] = []
+    run("job", counted([]), 1.0, tmp_path)
+    if change == "a damaged file":
+        (tmp_path / "job" / "2.npz").write_bytes(b"no zip")
+        run("job", counted(asked), 1.0, tmp_path)
+        assert asked == [2]
+    else:
+        run("job", replace(counted(asked), identity=lambda _: "something else"), 1.0, tmp_path)
+        assert asked == [0, 1, 2, 3, 4]
+
+
+def plant(root, path: str, text: str) -> None:
+    (root / path).parent.mkdir(parents=True, exist_ok=True)
+    (root / path).write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("edit", "same"), [("return x * 3", False), ('"""New words."""\n    return x * 2  # so', True)]
+)
+def test_the_digest_of_code_sees_what_is_reached_by_imports_but_not_words(tmp_path, monkeypatch, edit, same) -> None:
+    def digest(body: str) -> str:
+        for cached in (job.code, job._imports, job._syntax):
+            cached.cache_clear()
+        plant(tmp_path, "restir_ref/deep.py", f"def f(x):\n    {body}\n")
+        return job.code("benchmarks.one")
+
+    monkeypatch.setattr(job, "ROOT", tmp_path)
+    plant(tmp_path, "benchmarks/one.py", "from restir_ref import between")
+    plant(tmp_path, "restir_ref/__init__.py", "")
+    plant(tmp_path, "restir_ref/between.py", "from restir_ref.deep import f")
+    assert (digest('"""Words."""\n    return x * 2') == digest(edit)) is same
+    for cached in (job.code, job._imports, job._syntax):
+        cached.cache_clear()
+
+
+# ---------------------------------------------------------------- the command
+
+
+def main(tmp_path, monkeypatch, *found: Job) -> tuple[int, str, dict]:
+    """Exit status, page and JSON of a run of jobs in a checkout of their own."""
+    names = {f"job {k}": each for k, each in enumerate(found)}
+    monkeypatch.setattr(jobs, "JOBS", MappingProxyType(names))
+    folders = [f"--stored={tmp_path / 'out'}", f"--results={tmp_path / 'checkout'}"]
+    status = evidence.main([*names, *folders])
+    page = (tmp_path / "checkout" / report.TABLE).read_text(encoding="utf-8")
+    return status, page, json.loads((tmp_path / "checkout" / report.JSON).read_text(encoding="utf-8"))
+
+
+def red() -> Job:
+    return replace(counted([]), judge=lambda done: [Row("GRIS-A09", "|a sum|", 1.0, "0", holds=False, count=len(done))])
+
+
+def test_results_are_filed_with_where_they_come_from_and_a_red_one_ends_with_1(tmp_path, monkeypatch) -> None:
+    status, page, found = main(tmp_path, monkeypatch, counted([]))
+    assert status == 0
+    assert found["job 0"]["seed"] == job.SEED
+    assert {"commit", "changed", "code", "chunks", "cpu_minutes", "share"} < found["job 0"].keys()
+    status, page, found = main(tmp_path, monkeypatch, counted([]), red())
+    assert status == 1
+    assert "**FAILS**" in page
+    assert "\\|a sum\\|" in page
+    assert [row["holds"] for each in found.values() for row in each["rows"]] == [True, False]
+
+
+def test_a_later_run_of_one_job_leaves_the_others_alone(tmp_path, monkeypatch) -> None:
+    _, before, _ = main(tmp_path, monkeypatch, counted([]), red())
+    _, after, found = main(tmp_path, monkeypatch, counted([]))
+    assert found.keys() == {"job 0", "job 1"}
+    assert before == after
+
+
+# ---------------------------------------------------------------- how means are judged
+
+
+def noise(seed: int, shift=0.0, scale=1.0) -> Sums:
+    images = shift + scale * np.random.default_rng(seed).standard_normal((16, 64, 32))
+    return joined([stored(sums(each), "images") for each in images], "images")
+
+
+def test_noise_without_bias_holds_and_bias_or_too_much_noise_fails() -> None:
+    def holds(found: Sums) -> bool:
+        return judged("", "", found, nothing(32), 1.0, 0.01).holds
+
+    assert all(holds(noise(seed)) for seed in range(8))
+    assert not holds(noise(1, shift=0.05))
+    assert not holds(noise(1, scale=3.0))
+
+
+def test_errors_of_both_signs_that_cancel_in_the_mean_are_seen_by_the_spread() -> None:
+    found = noise(2, shift=np.tile([0.1, -0.1], 16))
+    assert spread(found, nothing(32)) > 1.5 * spread_by_chance(found)
+    assert not judged("", "", found, nothing(32), 1.0, 0.01).holds
+
+
+# ---------------------------------------------------------------- jobs at tiny counts, and planted mistakes
+
+
+def rows(found: Job, share: float, *only: str) -> list[Row]:
+    """What a job says at a tiny share, of chunks that hold these values."""
+    chunks = [params for params in found.chunks(share) if set(only) <= set(params.values())]
+    done = [(params, found.compute(params, rng=np.random.default_rng(k))) for k, params in enumerate(chunks)]
+    return list(found.judge(done))
+
+
+@pytest.fixture
+def few(monkeypatch) -> None:
+    """Counts of a second."""
+    monkeypatch.setattr(roundtrips, "TRIPS", 4000)
+    monkeypatch.setattr(retracing, "TRACED", 4000)
+    monkeypatch.setattr(retracing, "DIFFERENCED", 15)
+    monkeypatch.setattr(probes, "WATCHED", (1, 2))
+    monkeypatch.setattr(probes, "REPLICAS", 8)
+    monkeypatch.setattr(probes, "LATTICES", 2)
+    monkeypatch.setattr(probes, "lattice", lambda D: lattice(D)[:, ::8])
+    monkeypatch.setattr(extremes, "BATCH", 256)
+    monkeypatch.setattr(tracing_job, "IMAGES", 10)
+    monkeypatch.setattr(tracing_job, "lattice", lambda D: lattice(D)[:, ::32])
+    monkeypatch.setattr(baselines, "FINE", Fineness(64, 32, 2))
+    monkeypatch.setattr(baselines, "COARSE", Fineness(32, 16, 1))
+    monkeypatch.setattr(offline, "FRAMES", 8)
+    monkeypatch.setattr(comparing, "FLIPS", 100)
+
+
+@pytest.mark.usefixtures("few")
+@pytest.mark.parametrize(
+    "found", [roundtrips.JOB, retracing.JOB, extremes.JOB], ids=["round trips", "re-tracing", "extremes"]
+)
+def test_shifts_return_are_found_again_and_stay_finite(found) -> None:
+    said = rows(found, 0.001, "glossy_cornell")
+    assert said
+    assert all(row.holds for row in said)
+
+
+def never(rule, r_x, r_z, distance):
+    """A mistake: the replayed prefix is not tested for an earlier connection."""
+    return np.zeros(len(distance), dtype=bool)
+
+
+def unchecked(monkeypatch) -> None:
+    right = shifts_module._step
+
+    def step(*args):
+        original, shifts_module.connectable = shifts_module.connectable, never
+        try:
+            return right(*args)
+        finally:
+            shifts_module.connectable = original
+
+    monkeypatch.setattr(shifts_module, "_step", step)
+
+
+@pytest.mark.usefixtures("few")
+def test_a_missing_test_for_earlier_connections_turns_re_tracing_red(monkeypatch) -> None:
+    unchecked(monkeypatch)
+    said = rows(retracing.JOB, 0.001, "glossy_cornell", "hybrid")
+    assert not said[0].holds
+    assert said[0].value > 3
+
+
+@pytest.mark.usefixtures("few")
+def test_an_inverted_jacobian_one_way_turns_round_trips_red(monkeypatch) -> None:
+    right = shifts_module.ratio
+    monkeypatch.setattr(shifts_module, "ratio", lambda a, b: right(a, b) * 1.01 if np.ndim(a) == 1 else right(a, b))
+    said = rows(roundtrips.JOB, 0.001, "cornell")
+    assert not any(row.holds for row in said if "replay" not in row.what)
+
+
+@pytest.mark.usefixtures("few")
+def test_a_single_failing_path_is_an_edge_case_and_one_among_failures_is_not(monkeypatch) -> None:
+    setting = SCENES["cornell"]()
+    t, base = roundtrips.film(setting, "replay"), roundtrips.lit(setting, 64, np.random.default_rng(1))
+    x = roundtrips.traced(t, base.u, base.i, base.k, base.nee)
+    right, mine = roundtrips.trips, take(x, np.array([0]))
+
+    def fails(where):
+        def broken(t, x, i, j) -> Trips:
+            found = right(t, x, i, j)
+            return replace(found, back=np.where(where(x), 0.0, found.back))
+
+        return broken
+
+    for where, logic in ((lambda x: (x.u == mine.u).all(axis=0), False), (lambda x: x.u[0] >= 0, True)):
+        monkeypatch.setattr(roundtrips, "trips", fails(where))
+        assert roundtrips.is_logic(t, mine, base.i[0], base.i[0], np.random.default_rng(2)) is logic
+
+
+@pytest.mark.usefixtures("few")
+def test_a_nan_turns_the_extremes_red(monkeypatch) -> None:
+    right = extremes.record
+    monkeypatch.setattr(
+        extremes, "record", lambda t, tree, k, nee, F: replace(right(t, tree, k, nee, F), A=F[0] * np.nan)
+    )
+    assert not all(row.holds for row in rows(extremes.JOB, 0.001, "cornell"))
+
+
+def tiny_means(monkeypatch) -> list[Row]:
+    monkeypatch.setattr(means, "EPS", 0.02)
+    return rows(means.JOB, 0.02, "cornell", "hybrid", "across pixels")
+
+
+def test_reuse_across_pixels_has_no_bias_at_a_tiny_count(monkeypatch) -> None:
+    assert all(row.holds for row in tiny_means(monkeypatch))
+
+
+def test_the_neighbour_whose_sample_is_brighter_turns_the_means_red(monkeypatch) -> None:
+    """A mistake: neighbours chosen by their samples."""
+    monkeypatch.setattr(means, "spatial", by_brightness)
+    assert not any(row.holds for row in tiny_means(monkeypatch))
+
+
+def by_brightness(X, here, near, chance):
+    left, right = random_in_row(here.of, here.index, 2, 20, chance)
+    p_left, p_right = (X.x.F.mean(axis=0)[at.index] * X.W[at.index] for at in (left, right))
+    brighter = Pixels(here.of, np.where(p_left > p_right, left.index, right.index))
+    return RIGHT(X, here, [brighter], chance)
+
+
+RIGHT = means.spatial
+
+
+@pytest.mark.usefixtures("few")
+def test_techniques_agree_at_a_tiny_count_and_a_wrong_one_does_not(monkeypatch) -> None:
+    monkeypatch.setattr(tracing_job, "EPS", 0.02)
+    monkeypatch.setattr(comparing, "SIGMA", 5.0)  # t of 19 degrees of freedom, 16 tests: false alarm .1%
+    chunks = [{"of": "techniques", "scene": "clear_coat", "part": part} for part in (0, 1)]
+
+    def said() -> list[Row]:
+        done = [tracing_job.compute(params, rng=np.random.default_rng(params["part"])) for params in chunks]
+        return tracing_job.each_other("clear_coat", done)
+
+    assert all(row.holds for row in said())
+    wrong = {**tracing_job.TECHNIQUES, "light samples alone": lambda *of: tracing_job.by_lights(*of) * 1.1}
+    monkeypatch.setattr(tracing_job, "TECHNIQUES", wrong)
+    assert not all(row.holds for row in said())
+
+
+@pytest.mark.usefixtures("few")
+@pytest.mark.parametrize("name", ["path reuse, cornell", "ReSTIR GI, glossy", "ReSTIR DI, 1/Z"])
+def test_baselines_run(name) -> None:
+    asked = baselines.BASELINES[name]
+    arrays = baselines.compute({"of": name, "part": 0}, rng=np.random.default_rng(1))
+    assert arrays["images.total"].mean() / baselines.REPLICAS == pytest.approx(
+        asked.truth(asked.scene).mean.mean(), rel=0.1
+    )
+
+
+@pytest.mark.usefixtures("few")
+def test_offline_frames_and_probes_run() -> None:
+    assert offline.compute({"rule": "hybrid", "part": 0}, rng=np.random.default_rng(1))["frames"].shape == (8, 128)
+    assert len(rows(probes.JOB, 0.001)) == 5 * len(probes.PROBES)
