@@ -19,10 +19,12 @@ def main(arguments: Sequence[str]) -> int:
     """Run jobs, print what they say, and file it; 1 if anything does not hold."""
     sys.path.insert(0, str(ROOT))
     from benchmarks.jobs import JOBS, PUBLISH  # noqa: PLC0415  (the path comes first)
-    from benchmarks.jobs.job import run  # noqa: PLC0415
+    from benchmarks.jobs.job import code, run  # noqa: PLC0415
     from benchmarks.jobs.report import checkout, file, measured, print_rows  # noqa: PLC0415
 
     options = parser(list(JOBS)).parse_args(arguments)
+    for job in JOBS.values():
+        code(job.compute.__module__)  # before anybody edits what is loaded now
     fine, begun = True, checkout()
     for name in options.jobs or JOBS:
         done = run(name, JOBS[name], options.share, options.stored, options.processes)

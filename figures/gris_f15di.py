@@ -2,7 +2,7 @@
 
 Sixty-four lamps behind slats.  One path tree per pixel and frame, whose direct light is replaced by ReSTIR DI
 with 32 candidates, history and three neighbours, its weights 1/Z with visibility; the last frame of a run is shown.
-Direct light alone has an exact reference, quadrature over the lamps.  Against it, ReSTIR DI is also run with
+Direct light alone has an exact reference, radiosity's first bounce.  Against it, ReSTIR DI is also run with
 weights 1/M, which are not to be trusted where shadows end.
 """
 
@@ -16,7 +16,8 @@ from figures import criteria, style
 from figures.figure import Arrays, Claim, Figure
 from figures.flatland import means, samples_of_equal_cost, view
 from figures.references import reference
-from flatland2d.radiosity import cut, gather
+from flatland2d import SCENES
+from flatland2d.radiosity import render
 from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
@@ -39,15 +40,6 @@ PARTS = ("direct light", "whole image")
 HOW = ("path tracing", "ReSTIR DI")
 RAYS_OF_DIRECT_LIGHT = 3
 """Path tracing of direct light: from the eye, to a lamp, and a BSDF sample."""
-
-
-def direct_image(scene: Scene, sensor: Pinhole, film: int, per_lamp: int = 16) -> Array:
-    """Direct light from panels of the lamps, `film` points per pixel; (n,)."""
-    u = np.tile((np.arange(film) + 0.5) / film, sensor.n)[None]
-    v, _, _ = first_hit(Tracer(scene, sensor, 1, RECONNECTION), u, np.repeat(np.arange(sensor.n), film))
-    panels = cut(scene, per_lamp)
-    arriving = gather(scene, panels, panels.emission, v.x, v.prim, v.n)
-    return np.asarray(arriving.reshape(sensor.n, film).mean(axis=1))
 
 
 def shadow_edges(scene: Scene, sensor: Pinhole, radius: int = 20) -> Array:
@@ -96,15 +88,13 @@ def last_frame(preset: Any, mis: Weights, chance: Chance) -> tuple[Tree, Array, 
 
 def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
     """All images, costs, and references (part, pixel)."""
-    tracer = view(SCENE, RECONNECTION, Counter()).tracer
-    sensor = tracer.sensor
-    assert isinstance(sensor, Pinhole)
-    scene = tracer.scene
+    setting = SCENES[SCENE]()
+    scene, sensor = setting.scene, setting.pinhole()
     return {
         "images": np.concatenate([result["images"] for result in results], axis=2),
         "biased": np.concatenate([result["biased"] for result in results]),
         "rays": np.mean([result["rays"] for result in results], axis=0),
-        "reference": np.stack([direct_image(scene, sensor, film=8), reference(SCENE).mean]),
+        "reference": np.stack([render(scene, sensor, 1), reference(SCENE).mean]),
         "edges": shadow_edges(scene, sensor),
     }
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.jobs.comparing import BLOCKS, Sums, Truth, biased, joined, judged, stored, sums
+from benchmarks.jobs.comparing import BLOCKS, Sums, Truth, biased, joined, judged, refined, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
-from benchmarks.jobs.nystrom import COARSE, FINE, render
+from benchmarks.jobs.references import coarse_and_fine
 from figures.figure import Arrays
 from figures.references import reference
 from flatland2d.scenes import INSET, SCENES
@@ -78,10 +78,8 @@ def whole(scene: str) -> Truth:
 
 
 def direct(scene: str) -> Truth:
-    """Direct light by radiosity with exact visibility."""
-    setting = replace(SCENES[scene](), depth=1)
-    coarse, fine = (render(setting, setting.pinhole(), fine) for fine in (COARSE, FINE))
-    return Truth(fine, np.abs(fine - coarse), float(abs(fine.mean() - coarse.mean())))
+    """Direct light by radiosity."""
+    return refined(coarse_and_fine(replace(SCENES[scene](), depth=1)))
 
 
 @dataclass(frozen=True)

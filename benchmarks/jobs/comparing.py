@@ -73,6 +73,12 @@ def joined(chunks: list[Arrays], name: str) -> Sums:
     return Sums(np.concatenate(blocks), np.concatenate(total), np.sum(square, axis=0))
 
 
+def refined(images: Array) -> Truth:
+    """The finer of two images, (2, n); its change is the error."""
+    coarse, fine = images
+    return Truth(fine, np.abs(fine - coarse), float(abs(fine.mean() - coarse.mean())))
+
+
 def as_truth(found: Sums) -> Truth:
     """A mean image as the truth for another one."""
     image = found.blocks.mean(axis=1)

@@ -3,8 +3,9 @@
 Replicas are independent renderings of the inset by a frame's loop; only the last frame of each counts, frames
 of one chain are never averaged.  Two comparisons: what reuse adds to the same frame's initial samples,
 which needs no reference and has mean 0; and the mean against the path traced reference, whose
-standard error is added.  Both for the image's mean and for eight blocks of pixels.  The spread
-of the pixels' z-scores is 1 without bias, and more where pixels err in both directions.
+standard error is added.  Both for the image's mean, for eight blocks of pixels, and for all pixels at
+once.  After some frames of both kinds of reuse a pixel has little left of its own sample, and the
+first comparison is the noisier one: it is left out there.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,8 +28,8 @@ from restir_ref.transport.paths import Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
 from tests.transport.paths import RULES
 
-CHUNKS, REPLICAS = {"cornell": 32, "glossy_cornell": 64, "ajar": 320, "clear_coat": 64}, 64
-"""Chunks by scene, of 64 replicas of 128 pixels: 2048 to 20 480, as much as 0.5% takes."""
+CHUNKS, REPLICAS = {"cornell": 32, "glossy_cornell": 32, "ajar": 128, "clear_coat": 32}, 64
+"""Chunks by scene, of 64 replicas of 128 pixels: 2048, and 8192 where the light is rare, as much as 0.5% takes."""
 SHIFTS = ("hybrid", "reconnection")
 
 
@@ -108,10 +109,10 @@ def judge(done: Done) -> Sequence[Row]:
         scale = float(truth.mean.mean())
         exact = Truth(truth.mean, truth.error, truth.image_error)
         added, result = joined(mine, "added"), joined(mine, "result")
-        rows += [
-            judged(CLAIMS, f"{where}: bias against the frames' own initial samples", added, nothing(INSET), scale, EPS),
-            judged(CLAIMS, f"{where}: bias against the reference", result, exact, scale, EPS),
-        ]
+        rows.append(judged(CLAIMS, f"{where}: bias against the reference", result, exact, scale, EPS))
+        if MODES[case[2]].frames == 1 or not MODES[case[2]].rounds:
+            own = f"{where}: bias against the frames' own initial samples"
+            rows.append(judged(CLAIMS, own, added, nothing(INSET), scale, EPS))
     return rows
 
 

@@ -1,4 +1,4 @@
-"""Reference images: radiosity where every surface is Lambert, long path tracing elsewhere and as a check.
+"""Reference images: radiosity where it applies and is resolved, long path tracing elsewhere and as a check.
 
 Path tracing takes all leaves of every tree, light and BSDF sampling combined by MIS.  Primary numbers are a
 lattice of 1021 points, moved at random for every pixel anew: each sample is uniform, so
@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
-from benchmarks.jobs.nystrom import COARSE, FINE, is_lambert, render
 from figures.figure import Arrays
 from figures.references import PATH, Reference, fingerprint, save
+from flatland2d.radiosity import cut, render
 from flatland2d.scenes import INSET, SCENES, Setting
 from restir_ref.batch import Array
 from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
@@ -25,6 +25,10 @@ LATTICES = 10
 CHUNKS, CHECKS = 98, 10
 """Chunks where path tracing is the reference, 1 000 580 samples per pixel, and where it checks radiosity."""
 PIXELS_AT_ONCE = 8
+PANELS, FILM = (120, 240), 24
+"""Panels per segment, coarse and fine, and points per part of a pixel."""
+UNRESOLVED = ("many_lights",)
+"""Scenes whose segments have more edges of shadows than panels: there path tracing is the better reference."""
 LIMIT, EPS, SIGMA, SPREAD = 1e-3, 0.003, 4.0, 1.3
 TRACED = "path tracing, light and BSDF sampling combined by MIS, randomly moved lattices"
 REFINED = "radiosity with exact visibility; the error is its change when refined"
@@ -50,9 +54,23 @@ def image(setting: Setting, rng: np.random.Generator) -> Array:
     return np.concatenate([moved(t, np.arange(at, at + PIXELS_AT_ONCE), rng) for at in first])
 
 
+def has_radiosity(scene: str) -> bool:
+    """Whether radiosity is the reference."""
+    try:
+        cut(SCENES[scene]().scene, 1)
+    except ValueError:
+        return False
+    return scene not in UNRESOLVED
+
+
+def coarse_and_fine(setting: Setting) -> Array:
+    """Radiosity of the inset, (2, n)."""
+    return np.array([render(setting.scene, setting.pinhole(), setting.depth, panels, FILM) for panels in PANELS])
+
+
 def chunks(share: float) -> Sequence[Params]:
     """Radiosity, then path tracing chunk by chunk."""
-    lambert = [scene for scene, setting in SCENES.items() if is_lambert(setting().scene)]
+    lambert = [scene for scene in SCENES if has_radiosity(scene)]
     counts = {scene: CHECKS if scene in lambert else CHUNKS for scene in SCENES}
     traced = sorted((part, scene) for scene, count in counts.items() for part in parts(count, share))
     refined: list[Params] = [{"scene": scene, "part": "radiosity"} for scene in lambert]
@@ -63,14 +81,14 @@ def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
     """Independent images, (LATTICES, n), or the coarse and the fine one."""
     setting = SCENES[params["scene"]]()
     if params["part"] == "radiosity":
-        return {"images": np.array([render(setting, setting.pinhole(), fine) for fine in (COARSE, FINE)])}
+        return {"images": coarse_and_fine(setting)}
     return {"images": np.array([image(setting, rng) for _ in range(LATTICES)])}
 
 
 def identity(params: Params) -> str:
     """The scene, and for radiosity how fine it is; whatever transport becomes is tested against these references."""
     scene = fingerprint(SCENES[params["scene"]]())
-    return f"{scene} {COARSE} {FINE}" if params["part"] == "radiosity" else scene
+    return f"{scene}, panels {PANELS}, film {FILM}" if params["part"] == "radiosity" else scene
 
 
 def traced(done: Done, scene: str) -> Reference:

@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.jobs.comparing import Truth, as_truth, biased, joined, judged, nothing, stored, sums
+from benchmarks.jobs.comparing import as_truth, biased, joined, judged, nothing, refined, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
-from benchmarks.jobs.nystrom import COARSE, FINE, render
-from benchmarks.jobs.references import lattice
+from benchmarks.jobs.references import coarse_and_fine, lattice
 from figures.figure import Arrays
 from flatland2d.scenes import INSET, SCENES, Setting, matte
 from restir_ref.batch import Array
@@ -103,8 +102,7 @@ def by_technique(params: Params, rng: np.random.Generator) -> Arrays:
 
 def by_radiosity(params: Params, rng: np.random.Generator) -> Arrays:
     """A coarse and a fine image."""
-    setting = SEEN[params["scene"]]()
-    return {"images": np.array([render(setting, setting.pinhole(), fine) for fine in (COARSE, FINE)])}
+    return {"images": coarse_and_fine(SEEN[params["scene"]]())}
 
 
 # ---------------------------------------------------------------- the film as a whole
@@ -166,10 +164,9 @@ def each_other(scene: str, mine: list[Arrays]) -> list[Row]:
 
 def against_radiosity(scene: str, mine: list[Arrays], exact: Array) -> list[Row]:
     """Techniques against a deterministic truth."""
-    coarse, fine = exact
-    truth = Truth(fine, np.abs(fine - coarse), float(abs(fine.mean() - coarse.mean())))
+    truth = refined(exact)
     names = [name for name in TECHNIQUES if name != "both in full"]
-    claims, scale = "GRIS-E49, COM-A01, COM-B01", float(fine.mean())
+    claims, scale = "GRIS-E49, COM-A01, COM-B01", float(truth.mean.mean())
     return [
         judged(claims, f"{scene}: {name} against radiosity", joined(mine, name), truth, scale, EPS) for name in names
     ]

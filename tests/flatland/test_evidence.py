@@ -8,11 +8,22 @@ import numpy as np
 import pytest
 
 from benchmarks import evidence, jobs
-from benchmarks.jobs import baselines, comparing, extremes, job, means, offline, probes, report, retracing, roundtrips
+from benchmarks.jobs import (
+    baselines,
+    comparing,
+    extremes,
+    job,
+    means,
+    offline,
+    probes,
+    references,
+    report,
+    retracing,
+    roundtrips,
+)
 from benchmarks.jobs import tracing as tracing_job
 from benchmarks.jobs.comparing import Sums, joined, judged, nothing, spread, spread_by_chance, stored, sums
 from benchmarks.jobs.job import Job, Row, parts, run
-from benchmarks.jobs.nystrom import Fineness
 from benchmarks.jobs.references import lattice
 from benchmarks.jobs.roundtrips import Trips
 from flatland2d import SCENES
@@ -181,8 +192,7 @@ def few(monkeypatch) -> None:
     monkeypatch.setattr(extremes, "BATCH", 256)
     monkeypatch.setattr(tracing_job, "IMAGES", 10)
     monkeypatch.setattr(tracing_job, "lattice", lambda D: lattice(D)[:, ::32])
-    monkeypatch.setattr(baselines, "FINE", Fineness(64, 32, 2))
-    monkeypatch.setattr(baselines, "COARSE", Fineness(32, 16, 1))
+    monkeypatch.setattr(references, "PANELS", (4, 8))
     monkeypatch.setattr(offline, "FRAMES", 8)
     monkeypatch.setattr(comparing, "FLIPS", 100)
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.jobs.nystrom import Fineness, render
-from benchmarks.jobs.references import moved
+from benchmarks.jobs.references import has_radiosity, moved
 from figures import references
 from figures.errors import FigureError
 from figures.references import Reference, fingerprint, reference, save
 from flatland2d import SCENES
-from flatland2d.scenes import FURNACE_ALBEDO, INSET
+from flatland2d.radiosity import render
+from flatland2d.scenes import INSET
 from restir_ref.transport import paths
 from restir_ref.transport.paths import RECONNECTION, Tracer
 
@@ -54,17 +54,12 @@ def test_light_counted_twice_is_noticed(monkeypatch) -> None:
     assert z_of_path_tracing("matte_cornell") > 8
 
 
-@pytest.mark.parametrize("scene", ["matte_cornell", "nearly_closed", "checker"])
-def test_radiosity_with_exact_visibility_approaches_the_reference(scene) -> None:
-    setting, truth = SCENES[scene](), reference(scene).mean.mean()
-    image = render(setting, setting.pinhole(), Fineness(nodes=800, cuts=64, film=3))
-    assert image.mean() == pytest.approx(truth, rel=0.006)
-
-
-def test_radiosity_of_a_furnace_is_its_closed_form() -> None:
-    setting = SCENES["furnace"]()
-    truth = (1 - FURNACE_ALBEDO ** (setting.depth + 1)) / (1 - FURNACE_ALBEDO)
-    assert render(setting, setting.pinhole(4), Fineness(32, 8, 2)) == pytest.approx(truth, rel=1e-12)
+@pytest.mark.parametrize("scene", [scene for scene in SCENES if has_radiosity(scene)])
+def test_radiosity_is_the_reference_where_it_applies(scene) -> None:
+    setting, found = SCENES[scene](), reference(scene)
+    assert found.samples == 0
+    image = render(setting.scene, setting.pinhole(), setting.depth, per_segment=30, film=4)
+    assert image.mean() == pytest.approx(found.mean.mean(), rel=0.002)
 
 
 # ---------------------------------------------------------------- never a stale one

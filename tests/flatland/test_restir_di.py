@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from figures.criteria import all_unbiased, biased, mean_and_blocks, unbiased
-from figures.gris_f15di import direct_image, shadow_edges
+from figures.gris_f15di import shadow_edges
 from flatland2d import SCENES
+from flatland2d.radiosity import cut, gather
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.loop import random_in_row
 from restir_ref.mis import Weights
 from restir_ref.restir import initial, shade
-from restir_ref.transport.paths import RECONNECTION, Tracer, leaves, trace
+from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit, leaves, trace
 from restir_ref.transport.restir_di import (
     BIASED,
     CANDIDATES,
@@ -37,7 +38,9 @@ def tracer(scene: str, n: int = PIXELS) -> Tracer:
 
 def quadrature(t: Tracer) -> Array:
     """Direct light at the pixels' centres."""
-    return direct_image(t.scene, t.sensor, film=1, per_lamp=32)
+    v, _, _ = first_hit(t, np.full((1, t.sensor.n), CENTRE), np.arange(t.sensor.n))
+    panels = cut(t.scene, 16)
+    return gather(t.scene, panels, panels.emission, v.x, v.prim, v.n)
 
 
 def images(t: Tracer, mis: Weights, batches: int) -> Array:
