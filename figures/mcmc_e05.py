@@ -68,8 +68,9 @@ class Base:
 
 @dataclass(frozen=True)
 class Moved:
-    """Mutated paths: whether there is a direction that leaves x_1, its angle, C and q (N,)."""
+    """Mutated paths: primary sample u (D, N), whether there is a direction that leaves x_1, its angle, C and q (N,)."""
 
+    u: Array
     exists: Array
     angle: Array
     C: Array
@@ -100,7 +101,7 @@ def moved(t: Tracer, x: Base, number: Array, allowed: Array) -> Moved:
     tree = trace(t, u, x.pixel)
     C = sum(F.mean(axis=0) * ((x.k == k) & (x.nee == nee)) for k, nee, F in leaves(tree))
     at, exists = tree.at[0], (allowed > 0) & tree.at[0].weight.any(axis=0)
-    return Moved(exists, angle_of(t.scene.space.to_local(x.v.n, at.w)), np.asarray(C * exists), at.p)
+    return Moved(u, exists, angle_of(t.scene.space.to_local(x.v.n, at.w)), np.asarray(C * exists), at.p)
 
 
 def by_numbers(t: Tracer, x: Base, sigma: float, chance: Chance) -> tuple[Moved, Array]:
@@ -189,6 +190,9 @@ REASON = (
 )
 
 
+LIMITS = (0.04, 15)
+
+
 def draw(a: Arrays) -> "Picture":
     """Acceptance rates over the typical turn, and their ratios with 95% intervals."""
     picture, axes = style.panels(2, len(NAMES), width=3.0, height=2.5)
@@ -196,7 +200,7 @@ def draw(a: Arrays) -> "Picture":
         turn = np.degrees(a["turns"][k, :, 1])
         for how, rates in zip(HOW, a["rates"][k].mean(axis=-1).T, strict=True):
             axes[0, k].semilogx(turn, rates, label=how)
-        axes[0, k].set(title=name.replace("_", " "), ylim=(0, 1.02))
+        axes[0, k].set(title=name.replace("_", " "), ylim=(0, 1.02), xlim=LIMITS)
         for number, how in enumerate(HOW[1:], start=1):
             found = [criteria.ratio_interval(rates[0], rates[number])[:2] for rates in a["rates"][k]]
             middle = a["rates"][k, :, 0].mean(axis=-1) / a["rates"][k, :, number].mean(axis=-1)
@@ -204,9 +208,9 @@ def draw(a: Arrays) -> "Picture":
             colour, marker = style.COLOURS[number], style.MARKERS[number]
             axes[1, k].errorbar(turn, middle, [middle - low, high - middle], color=colour, marker=marker, label=how)
         axes[1, k].axhline(1, color="k", lw=0.8)
-        axes[1, k].set(xscale="log", xlabel="median turn of steps of numbers / degrees")
+        axes[1, k].set(xscale="log", xlim=LIMITS, xlabel="median turn by numbers / degrees")
     axes[0, 0].set_ylabel("acceptance rate")
-    axes[1, 0].set_ylabel("numbers / angles")
+    axes[1, 0].set_ylabel("acceptance, numbers / angles")
     axes[0, 0].legend(title="Gaussian steps of", loc="lower left")
     axes[1, 0].legend(title="compared with")
     return picture
@@ -218,7 +222,7 @@ FIGURE = Figure(
     world="flatland2d",
     source="[MCMC 3.2.3]",
     claims=("MCMC-E05",),
-    presets={"quick": {"replicas": 96}, "paper": {"replicas": 1536}},
+    presets={"quick": {"replicas": 192}, "paper": {"replicas": 1536}},
     chunks=chunks,
     compute=compute,
     combine=combine,

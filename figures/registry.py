@@ -53,6 +53,7 @@ MODULES: tuple[str, ...] = (
     "figures.gris_f15",
     "figures.gris_c12",
     "figures.gris_c16",
+    "figures.mcmc_e05",
 )
 ROOT = Path(__file__).resolve().parent.parent
 ID = re.compile(r"[A-Z][A-Z0-9]*-[A-Za-z0-9-]+")

@@ -35,15 +35,19 @@ SHIFTS = ("hybrid", "reconnection")
 
 @dataclass(frozen=True)
 class Mode:
-    """How many frames there are, how far the eye moves between them, and rounds of spatial reuse in each."""
+    """How many frames there are, how far the eye moves between them, rounds of spatial reuse in each.
+
+    `effort` multiplies the chunks: a single frame is noisier.
+    """
 
     frames: int
     step: float
     rounds: int
+    effort: float = 1.0
 
 
 MODES: Mapping[str, Mode] = {
-    "across pixels": Mode(1, 0.0, 1),
+    "across pixels": Mode(1, 0.0, 1, effort=1.5),
     "along time, still": Mode(4, 0.0, 0),
     "along time, moving": Mode(4, 0.002, 0),
     "along time and across pixels, still": Mode(4, 0.0, 1),
@@ -95,9 +99,9 @@ def columns() -> Array:
 
 def chunks(share: float) -> Sequence[Params]:
     """Chunk by chunk, all cases in each."""
-    cases = [{"rule": rule, "mode": mode} for rule in SHIFTS for mode in MODES]
-    every = [(part, scene) for scene, count in CHUNKS.items() for part in parts(count, share)]
-    return [{"scene": scene, **case, "part": part} for part, scene in sorted(every) for case in cases]
+    cases = [(scene, rule, mode) for scene in CHUNKS for rule in SHIFTS for mode in MODES]
+    every = [(part, case) for case in cases for part in parts(round(CHUNKS[case[0]] * MODES[case[2]].effort), share)]
+    return [{"scene": case[0], "rule": case[1], "mode": case[2], "part": part} for part, case in sorted(every)]
 
 
 def judge(done: Done) -> Sequence[Row]:

@@ -208,15 +208,20 @@ def evaluate_lobe(t: Table, space: Space, v: Vertex, lobe: Array, i: Array) -> t
 
 def evaluate_all(t: Table, space: Space, v: Vertex, P: Array, i: Array) -> tuple[Array, Array]:
     """f |cos| (C, N) and pdf (N,) of all lobes together, delta lobes left out: what light sampling sees."""
+    f, p = evaluate_each(t, space, v, i)
+    return total(f), total([share * pdf for share, pdf in zip(P, p, strict=True)])
+
+
+def evaluate_each(t: Table, space: Space, v: Vertex, i: Array) -> tuple[list[Array], list[Array]]:
+    """f |cos| (C, N) and pdf (N,), without its probability, of each lobe; both are 0 for delta lobes."""
 
     def both(kind: Lobe, s: LobeSurface, o: Array, i: Array) -> tuple[Array, ...]:
         pdf = kind.pdf(space, s, o, i)
         return pdf * kind.weight(space, s, o, i), pdf
 
     found = [_each_kind(t, v, l, t.kinds[l], both, i) for l in range(t.L)]
-    colours = [t.colour.take(v.material * t.L + l, axis=-1) for l in range(t.L)]
-    f = total([colour * value for colour, (value, _) in zip(colours, found, strict=True)])
-    return f, total([share * pdf for share, (_, pdf) in zip(P, found, strict=True)])
+    f = [t.colour.take(v.material * t.L + l, axis=-1) * value for l, (value, _) in enumerate(found)]
+    return f, [pdf for _, pdf in found]
 
 
 def scatter_lobe(t: Table, space: Space, v: Vertex, P: Array, lobe: Array, i: Array) -> tuple[Array, Array, Array]:

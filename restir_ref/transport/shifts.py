@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio, take, where
+from restir_ref.batch import Array, pick, ratio, take, total, where
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import (
@@ -140,9 +140,9 @@ def _beyond(t: Tracer, x: Path, z: Vertex, p_all_y: Array, r: Array) -> tuple[Ar
     table, space = t.scene.materials, t.scene.space
     P = mat.lobe_shares(table, z)
     local = space.to_local(z.n, x.out)
-    f, p = mat.evaluate_lobe(table, space, z, x.lobe_out, local)
-    p = P[x.lobe_out, np.arange(len(r))] * p
-    f_all, p_all = mat.evaluate_all(table, space, z, P, local)
+    each_f, each_p = mat.evaluate_each(table, space, z, local)
+    each_p = [share * pdf for share, pdf in zip(P, each_p, strict=True)]
+    (f, p), f_all, p_all = pick([*zip(each_f, each_p, strict=True)], x.lobe_out), total(each_f), total(each_p)
     through = np.where(x.c == x.k, ratio(p_all, p_all + x.p_light), 1.0) * ratio(f, p) * x.S
     lit = ratio(x.p_light, x.p_light + p_all) * f_all * x.S
     seen = emitted(t.scene, z) * ratio(p_all_y, p_all_y + light_pdf(t.scene, z, r))

@@ -193,6 +193,7 @@ def few(monkeypatch) -> None:
     monkeypatch.setattr(tracing_job, "IMAGES", 10)
     monkeypatch.setattr(tracing_job, "lattice", lambda D: lattice(D)[:, ::32])
     monkeypatch.setattr(references, "PANELS", (4, 8))
+    monkeypatch.setattr(references, "FILM", 1)
     monkeypatch.setattr(offline, "FRAMES", 8)
     monkeypatch.setattr(comparing, "FLIPS", 100)
 
