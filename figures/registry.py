@@ -54,6 +54,7 @@ MODULES: tuple[str, ...] = (
     "figures.gris_c12",
     "figures.gris_c16",
     "figures.mcmc_e05",
+    "figures.gris_x",
 )
 ROOT = Path(__file__).resolve().parent.parent
 ID = re.compile(r"[A-Z][A-Z0-9]*-[A-Za-z0-9-]+")

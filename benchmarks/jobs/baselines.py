@@ -18,15 +18,23 @@ from figures.references import reference
 from flatland2d.scenes import INSET, SCENES
 from restir_ref.batch import Array
 from restir_ref.chance import Live
-from restir_ref.integrals import Pixels
+from restir_ref.integrals import Image, Pixels
 from restir_ref.loop import REAL_TIME, frame, random_in_row
 from restir_ref.mis import Weights
 from restir_ref.restir import shade
 from restir_ref.transport.path_reuse import path_reuse
-from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit
+from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit, trace
 from restir_ref.transport.rays import emitted
-from restir_ref.transport.restir_di import BIASED, DEBIASED, direct_light, light_integrals
+from restir_ref.transport.restir_di import (
+    BIASED,
+    DEBIASED,
+    LightIntegrals,
+    direct_light,
+    indirect_light,
+    light_integrals,
+)
 from restir_ref.transport.restir_gi import RadianceIntegrals
+from restir_ref.transport.restir_pt import PathIntegrals
 
 REPLICAS, FRAMES, EPS = 64, 3, 0.005
 INDEX = np.arange(REPLICAS * INSET)
@@ -43,13 +51,17 @@ def tiles(scene: str, chance: Live) -> Array:
     return np.asarray(path_reuse(tracer(scene), INDEX % INSET, chance)[0])
 
 
-def stored_radiance(scene: str, chance: Live) -> Array:
-    """ReSTIR GI, the last of some frames with temporal and spatial reuse."""
-    here, Y = Pixels(RadianceIntegrals(tracer(scene)), INDEX), None
-    for _ in range(FRAMES):
-        Y = frame(here, chance, REAL_TIME, random_in_row, Y, [here])
-    assert Y is not None
-    return np.asarray(shade(Y, here)[0])
+def frames(of: Callable[[Tracer], Image]) -> Callable[[str, Live], Array]:
+    """Integrals in the loop, the last of some frames with temporal and spatial reuse."""
+
+    def rendered(scene: str, chance: Live) -> Array:
+        here, Y = Pixels(of(tracer(scene)), INDEX), None
+        for _ in range(FRAMES):
+            Y = frame(here, chance, REAL_TIME, random_in_row, Y, [here])
+        assert Y is not None
+        return np.asarray(shade(Y, here)[0])
+
+    return rendered
 
 
 def lights(mis: Weights) -> Callable[[str, Live], Array]:
@@ -69,6 +81,16 @@ def lights(mis: Weights) -> Callable[[str, Live], Array]:
         return np.asarray((shade(X, here) + T * emitted(t.scene, v))[0])
 
     return rendered
+
+
+def direct_and_traced(scene: str, chance: Live) -> Array:
+    """Path tracing whose direct light at x_1 is ReSTIR DI's, one frame with spatial reuse."""
+    t = tracer(scene)
+    tree = trace(t, chance.uniform((t.D, len(INDEX))), INDEX % INSET)
+    of = LightIntegrals(t.scene, INSET, tree.x[0], tree.T[0])
+    near = random_in_row(of, INDEX, REAL_TIME.neighbours, REAL_TIME.radius, chance)
+    here = Pixels(of, INDEX)
+    return np.asarray((shade(direct_light(here, near, DEBIASED["talbot"], chance), here) + indirect_light(tree))[0])
 
 
 def whole(scene: str) -> Truth:
@@ -116,14 +138,18 @@ def dark_at_edges(claims: str, what: str, found: Sums, truth: Truth) -> list[Row
     return [Row(claims, f"{what} at edges of shadows", bias, limit, holds, found.R, error / part.mean(), f"z {z:+.1f}")]
 
 
+GI, PT = frames(RadianceIntegrals), frames(PathIntegrals)
 BASELINES: Mapping[str, Baseline] = {
     "path reuse, cornell": Baseline("COM-B02", "cornell", tiles, whole, 16, unbiased),
     "path reuse, ajar": Baseline("COM-B02", "ajar", tiles, whole, 160, unbiased),
-    "ReSTIR GI, all Lambert": Baseline("COM-B03, GRIS-C11", "matte_cornell", stored_radiance, whole, 32, unbiased),
-    "ReSTIR GI, glossy": Baseline("COM-B03, GRIS-C11", "glossy_cornell", stored_radiance, whole, 64, certainly_biased),
+    "ReSTIR GI, all Lambert": Baseline("COM-B03, GRIS-C11", "matte_cornell", GI, whole, 32, unbiased),
+    "ReSTIR PT, all Lambert": Baseline("GRIS-C11", "matte_cornell", PT, whole, 32, unbiased),
+    "ReSTIR GI, glossy": Baseline("COM-B03, GRIS-C11", "glossy_cornell", GI, whole, 64, certainly_biased),
+    "ReSTIR PT, glossy": Baseline("GRIS-C11", "glossy_cornell", PT, whole, 64, unbiased),
     "ReSTIR DI, 1/Z": Baseline("COM-B04", "many_lights", lights(DEBIASED["1/Z"]), direct, 16, unbiased),
     "ReSTIR DI, Talbot": Baseline("COM-B04", "many_lights", lights(DEBIASED["talbot"]), direct, 16, unbiased),
     "ReSTIR DI, pairwise": Baseline("COM-B04", "many_lights", lights(DEBIASED["defensive"]), direct, 16, unbiased),
+    "path tracing with ReSTIR DI": Baseline("COM-B08", "matte_cornell", direct_and_traced, whole, 16, unbiased),
     "ReSTIR DI, 1/M": Baseline("COM-B04", "many_lights", lights(BIASED), direct, 16, dark_at_edges),
 }
 
