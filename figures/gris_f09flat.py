@@ -172,14 +172,14 @@ def ratio(errors: Array, others: Array, limit: float) -> criteria.Outcome:
 
 
 MANY = 3000
-"""Frames after which a chain's mean is judged by its slope; at a tenth of 1000 it is still bending, as is drawn."""
+"""Frames after which the mean of a chain is judged by its slope: after fewer the curve still bends, as is drawn."""
 
 
 def _of_means(a: Arrays) -> list[Claim]:
     claims = []
     for name, k in (("spatial only", SPATIAL), ("cap 20", CAPS.index(20))):
         t, error = a[f"t_mean.{k}"], a[f"mean.{k}"].mean(axis=1)
-        last = t >= t[-1] / 10
+        last = t >= t[t <= t[-1] / 10].max()
         outcome = criteria.slope_within(t[last], error[last], -1, 0.15, decades=1)
         if k == SPATIAL or t[-1] >= MANY:
             part = f"rough Cornell box, {name}: slope of the mean's relMSE, last decade"
@@ -208,9 +208,6 @@ def likeness(a: Arrays, k: int) -> float:
     """Correlation of the last two frames, relative to the truth, over pixels and chains."""
     one, other = (a[f"{key}.{k}"] / a["truth"] for key in ("last", "before"))
     return float(np.corrcoef(one.ravel(), other.ravel())[0, 1])
-
-
-# ---------------------------------------------------------------- drawing
 
 
 def draw(a: Arrays) -> "Picture":
@@ -269,8 +266,8 @@ def _images(axis: "Axes", a: Arrays) -> None:
     rows = (a["truth"], a[f"average.{UNCAPPED}"][0], a[f"last.{UNCAPPED}"][0], a["average.3"][0], a["last.3"][0])
     shown = np.repeat(np.stack(rows), 4, axis=0)
     axis.imshow(shown, vmin=0, vmax=1.5 * a["truth"].max(), aspect="auto", extent=(0, PIXELS, len(rows), 0))
-    labels = ("reference", "no cap, mean", "no cap, last", "cap 20, mean", "cap 20, last")
-    axis.set_yticks(np.arange(len(rows)) + 0.5, labels)
+    names = ("reference", "no cap, mean", "no cap, last", "cap 20, mean", "cap 20, last")
+    axis.set_yticks(np.arange(len(rows)) + 0.5, names)
     axis.grid(visible=False)
     axis.set(xlabel="pixel of the inset", title=f"One chain after {a['t_mean.3'][-1]} frames")
 
@@ -283,7 +280,7 @@ FIGURE = Figure(
     claims=("GRIS-F09a", "GRIS-F09b", "GRIS-F10"),
     presets={
         "quick": {
-            "short": {"caps": [1, 2, 4, 5], "replicas": [16, 16, 16, 16], "frames": 200, "blocks": 1},
+            "short": {"caps": [1, 2, 4, 5], "replicas": [12, 12, 12, 12], "frames": 200, "blocks": 1},
             "long": {"caps": [3, 6, 7], "replicas": [16, 16, 8], "frames": 1000, "blocks": 1},
             "spatial": {"frames": 4000},
         },

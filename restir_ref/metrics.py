@@ -5,7 +5,7 @@ Pixels come last, leading axes (replicas, frames) are kept.  Where neighbourhood
 """
 
 from dataclasses import dataclass
-from math import prod
+from math import prod, tau
 
 import numpy as np
 
@@ -130,7 +130,7 @@ def band_powers(errors: Array, alpha: float, axes: Axes = ROW) -> tuple[Array, A
     D is the spectrum of finite differences, so below alpha the screened Poisson equation keeps the
     primal image, above it the gradients.  White noise has mean e^2 in both bands; k = 0 is in the low one.
     """
-    D = total([2 - 2 * np.cos(2 * np.pi * k) for k in _frequencies(errors, axes)])
+    D = total([2 - 2 * np.cos(tau * k) for k in _frequencies(errors, axes)])
     kept = np.sqrt(D) < alpha
     low, high = _means(power_spectrum(errors, axes), axes, kept, ~kept)
     return low, high

@@ -34,12 +34,20 @@ def worst_of_each(figure: Figure, arrays: Arrays) -> dict[str, str]:
     return {id_: worst([verdict_of(claim) for claim in checked if claim.id == id_]) for id_ in figure.claims}
 
 
-def expected(figure: Figure) -> dict[str, str]:
-    """What the ledger expects of the figure's claims, all of which pass."""
+PASSES = ("reproduced", "reproduced with caveat")
+
+
+def differing(figure: Figure, arrays: Arrays) -> dict[str, str]:
+    """Claims that do not pass, or not as the ledger expects, which may be worse where flatland judges them too."""
     rows = load(Path(style.__file__).with_name("ledger.json"))
-    found = {id_: rows[id_].expected["quick"] for id_ in figure.claims}
-    assert set(found.values()) <= {"reproduced", "reproduced with caveat"}
-    return found
+    found, wanted = worst_of_each(figure, arrays), {id_: rows[id_].expected["quick"] for id_ in figure.claims}
+    elsewhere = {id_ for id_ in figure.claims if wanted[id_] not in PASSES}
+    assert elsewhere <= {"GRIS-F08"}
+    return {
+        id_: verdict
+        for id_, verdict in found.items()
+        if verdict not in PASSES or (verdict != wanted[id_] and id_ not in elsewhere)
+    }
 
 
 def spoilt(arrays: Arrays, name: str, how: Callable[[Any], Any]) -> Arrays:
@@ -67,8 +75,8 @@ SMALL = [
 @pytest.mark.parametrize(("name", "changes", "array", "spoil"), SMALL)
 def test_the_claims_hold_and_spoilt_numbers_do_not_pass(name, changes, array, spoil):
     figure = import_module(f"figures.gris_{name}").FIGURE
-    arrays, as_expected = made(figure, {**figure.presets["quick"], **changes}), expected(figure)
-    assert worst_of_each(figure, arrays) == as_expected
+    arrays = made(figure, {**figure.presets["quick"], **changes})
+    assert differing(figure, arrays) == {}
     assert "not reproduced" in verdicts(figure, spoilt(arrays, array, spoil))
     assert unlabelled(figure, arrays) == []
 
