@@ -122,8 +122,8 @@ def unbiased(claims: str, what: str, found: Sums, truth: Truth) -> list[Row]:
 
 
 def certainly_biased(claims: str, what: str, found: Sums, truth: Truth) -> list[Row]:
-    """By more than 1%, |z| >= 8."""
-    return [biased(claims, what, found, truth, float(truth.mean.mean()), 0.01)]
+    """By more than 1%, |z| >= 8, in the image or a block."""
+    return [biased(claims, what, found, truth, 0.01)]
 
 
 def dark_at_edges(claims: str, what: str, found: Sums, truth: Truth) -> list[Row]:

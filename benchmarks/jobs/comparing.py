@@ -121,13 +121,21 @@ def spread_by_chance(found: Sums) -> float:
     return float(np.sqrt((z**2).mean(axis=1)).max())
 
 
-def biased(claims: str, what: str, found: Sums, truth: Truth, scale: float, least: float) -> Row:
-    """A control: certainly biased, |bias| > least with |z| >= 8."""
-    z, error = of_image(found, truth)
-    bias = float(found.mean.mean() - truth.mean.mean()) / scale
-    holds = abs(bias) > least and abs(z) >= 8
+def biased(claims: str, what: str, found: Sums, truth: Truth, least: float) -> Row:
+    """A control: the image or a block of it is certainly biased, |bias| > least with |z| >= 8; the surest is shown.
+
+    Biases are relative to the truth of the image, or of the block.
+    """
+    means = np.append(truth.mean.mean(), truth.mean.reshape(BLOCKS, -1).mean(axis=1))
+    samples = np.concatenate([found.blocks.mean(axis=1)[:, None], found.blocks], axis=1)
+    z, error = z_scores(samples, means, 0.0)
+    bias = samples.mean(axis=0) / means - 1
+    worst = int(np.argmax(np.abs(z) * (np.abs(bias) > least)))
+    holds = abs(bias[worst]) > least and abs(z[worst]) >= 8
+    where = f"block {worst} of {BLOCKS}" if worst else "the image"
+    note = f"{where}, z {z[worst]:+.1f}; the image {bias[0]:+.2%}, z {z[0]:+.1f}"
     limit = f"control: |bias| > {least:.0%}, |z| >= 8"
-    return Row(claims, what, bias, limit, bool(holds), found.R, error / scale, f"z {z:+.1f}")
+    return Row(claims, what, float(bias[worst]), limit, bool(holds), found.R, float((error / means)[worst]), note)
 
 
 def of_image(found: Sums, truth: Truth) -> tuple[float, float]:

@@ -159,7 +159,8 @@ def each_other(scene: str, mine: list[Arrays]) -> list[Row]:
         for name in alone
     ]
     doubled = joined(mine, "both in full - MIS")
-    return [*rows, biased("GRIS-E49", what["both in full"], doubled, nothing(INSET), scale, 0.01)]
+    doubled, once = joined(mine, "both in full"), as_truth(joined(mine, "both by MIS"))
+    return [*rows, biased("GRIS-E49", what["both in full"], doubled, once, 0.01)]
 
 
 def against_radiosity(scene: str, mine: list[Arrays], exact: Array) -> list[Row]:

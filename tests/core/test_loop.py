@@ -1,13 +1,18 @@
 """Presets are the paper's; neighbours stay near, and those of the offline preset are evenly spread."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import pytest
 
 from restir_ref.batch import Array
-from restir_ref.loop import OFFLINE, REAL_TIME, Around, random_in_row, spread_in_row
+from restir_ref.chance import Live
+from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.loop import OFFLINE, REAL_TIME, Around, Preset, frame, random_in_row, spread_in_row
+from restir_ref.mis import WEIGHTS
+from restir_ref.restir import initial, spatial, temporal
 from tests.core.stubs import live
+from toy1d import overlapping_supports
 
 AROUND = {"random": random_in_row, "spread": spread_in_row}
 each_choice = pytest.mark.parametrize("around", AROUND.values(), ids=AROUND)
@@ -78,3 +83,67 @@ def test_neighbours_stay_in_their_row_and_replica(around):
     pixel = np.arange(4 * 30)
     found = steps(around, 30, 6, 10, pixel) + pixel
     assert (found // 30 == pixel // 30).all()
+
+
+@each_choice
+def test_at_the_ends_of_a_row_neighbours_are_mirrored(around):
+    for pixel in (0, 1, 98, 99):
+        found = steps(around, 100, 6, 10, np.full(5000, pixel)) + pixel
+        wanted = {min(abs(pixel + k), 198 - abs(pixel + k)) for k in range(-10, 11) if k}
+        assert set(found.ravel()) == wanted
+
+
+PRESET = Preset(trees=3, rounds=2, neighbours=2, radius=3, cap=1.5, along="1/Z", across="talbot")
+
+
+def right_of(here: Pixels) -> Pixels:
+    """The pixels that the image has moved from."""
+    return Pixels(here.of, here.index // 7 * 7 + (here.index + 1) % 7)
+
+
+def by_hand(here: Pixels, chance: Live, history: Reservoirs) -> Reservoirs:
+    """The passes of PRESET, one after the other."""
+    X = initial(here, chance, 3)
+    X = temporal(X, here, history, [right_of(here)], chance, mis=WEIGHTS["1/Z"], cap=1.5)
+    for _ in range(2):
+        near = random_in_row(here.of, here.index, 2, 3, chance)  # type: ignore[arg-type]
+        X = spatial(X, here, near, chance, mis=WEIGHTS["talbot"])
+    return X
+
+
+def frames_agree(**changes: object) -> bool:
+    """Whether a frame of the (changed) preset is what its passes give with the same numbers, to the last bit."""
+    here = Pixels(overlapping_supports(), np.arange(7 * 200))
+    history = replace(initial(here, live(3)), c=np.full(len(here.index), 4))
+    one = frame(here, live(4), replace(PRESET, **changes), random_in_row, history, [right_of(here)])  # type: ignore[arg-type]
+    two = by_hand(here, live(4), history)
+    return all(np.array_equal(getattr(one, name), getattr(two, name)) for name in ("x", "W", "c"))
+
+
+def test_a_frame_is_its_passes_in_their_order():
+    assert frames_agree()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"trees": 1},
+        {"rounds": 1},
+        {"neighbours": 3},
+        {"radius": 2},
+        {"cap": np.inf},
+        {"along": "talbot"},
+        {"across": "defensive"},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_no_parameter_of_a_preset_is_idle(changes):
+    assert not frames_agree(**changes)
+
+
+def test_a_frame_without_history_draws_no_temporal_pass():
+    here = Pixels(overlapping_supports(), np.arange(7 * 200))
+    one = frame(here, live(4), replace(PRESET, rounds=0), random_in_row)
+    two = initial(here, live(4), 3)
+    assert np.array_equal(one.W, two.W)
+    assert np.array_equal(one.x, two.x)
