@@ -6,11 +6,13 @@ Image means are nearly blind to wrong Jacobians, for reuse is nearly symmetric; 
 import numpy as np
 import pytest
 
-from flatland2d import SCENES
+from flatland2d import PLANE, SCENES
+from flatland2d.scenes import CORNELL_VIEW, LAMP, Setting, boxes, chain, room
 from restir_ref.batch import take
 from restir_ref.transport import shifts as shifts_module
 from restir_ref.transport.inversion import connection
-from restir_ref.transport.materials import evaluate_lobe
+from restir_ref.transport.materials import Layer, Material, evaluate_lobe
+from restir_ref.transport.scene import scene
 from restir_ref.transport.shifts import replay, shift_path
 from restir_ref.transport.vectors import norm
 from tests.transport.paths import HYBRID, RULES, finite_difference_jacobian, retraced, shifts, successful
@@ -154,3 +156,32 @@ def with_predicate(step, predicate):
             shifts_module.connectable = original
 
     return changed
+
+
+def contrary() -> Setting:
+    """A room whose first lobe is the glossy one, and whose lamp is a mirror: what is judged by the wrong lobe shows."""
+    walls = Material([Layer("ggx", (0.4,), 0.1, weight=0.4), Layer("lambert", (0.5,), weight=0.6)])
+    facets = [*room(0), *boxes(0), *chain(LAMP, 1, 8.0)]
+    return Setting(scene(PLANE, [walls, Material([Layer("mirror", (0.5,))])], facets), *CORNELL_VIEW)
+
+
+@pytest.mark.claims("GRIS-A13")
+@every_rule
+@pytest.mark.parametrize("scene", ["contrary", *SCENES])
+def test_a_path_shifted_into_its_own_pixel_is_itself(scene, rule) -> None:
+    setting = contrary() if scene == "contrary" else SCENES[scene]()
+    s = shifts(setting, RULES[rule], 600, seed=8)
+    y, J = shift_path(s.t, s.x, s.i)
+    assert (J == 0).mean() <= 5 * EDGE_CASES
+    assert np.abs(J - 1)[J > 0].max() < 1e-9
+    assert np.abs(y.F / s.x.F - 1)[:, J > 0].max() < 1e-6
+
+
+@pytest.mark.claims("GRIS-A13")
+@pytest.mark.parametrize("rule", ["hybrid", "reconnection"])
+def test_glossy_first_lobes_and_mirror_lamps_are_retraced_alike(rule) -> None:
+    s = successful(shifts(contrary(), RULES[rule], 12_000, seed=9))
+    _, y = retraced(s)
+    assert ((y.c != s.y.c) | (np.abs(y.F / s.y.F - 1).max(axis=0) > 1e-7)).mean() <= EDGE_CASES
+    kinds = {(int(c - k), bool(nee)) for c, k, nee in zip(s.x.c, s.x.k, s.x.nee, strict=True) if c}
+    assert {(1, False), (0, True), (0, False)} <= kinds
