@@ -35,7 +35,7 @@ from restir_ref.transport.restir_pt import PathIntegrals
 Run = Callable[[], Any]
 
 HYBRID = Connectability(0.2, 0.02)
-COLUMNS = 64 * INSET
+COLUMNS = 256 * INSET
 SIZES = [2**k for k in range(10, 17)]
 REPEATS, SHOWN = 15, 25
 STEP = 0.002
@@ -106,7 +106,8 @@ def frames(scene: str, step: float, columns: int = COLUMNS, asked: Counter[str] 
     Y = initial(Pixels(past[0], index), chance)
     for then, of in pairwise(past):
         Y = frame(Pixels(of, index), chance, REAL_TIME, random_in_row, Y, [came_from(of, then, index)])
-    return Frames(Pixels(now, index), came_from(now, past[-1], index), Y)
+    here = Pixels(now, index)
+    return Frames(here, came_from(now, past[-1], index) if step else here, Y)  # a still eye's history is its own
 
 
 def came_from(now: PathIntegrals, then: PathIntegrals, index: Array) -> Pixels:
