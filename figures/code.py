@@ -1,7 +1,7 @@
 """A digest of the code that a figure's chunks depend on, so that results of older code are computed again.
 
-It covers the theory, the figure's world, and the figure's module with the figure modules that it imports.  Comments
-and layout do not count.
+It covers the theory, the figure's world, and the figure's module with the figure modules that it imports, each with the
+numbers in an `.npz` of its name.  Comments and layout do not count.
 """
 
 import ast
@@ -19,12 +19,18 @@ def digest(module: str, world: str) -> str:
     total = hashlib.sha256()
     for path in [*_package("restir_ref"), *_package(world), *_figure_files(module)]:
         total.update(_syntax(path))
+        total.update(_data(path.with_suffix(".npz")))
     return total.hexdigest()[:16]
 
 
 @cache
 def _syntax(path: Path) -> bytes:
     return hashlib.sha256(ast.dump(ast.parse(path.read_bytes())).encode()).digest()
+
+
+def _data(path: Path) -> bytes:
+    """Numbers that a module keeps in a file of its own name, such as reference images."""
+    return hashlib.sha256(path.read_bytes()).digest() if path.exists() else b""
 
 
 @cache

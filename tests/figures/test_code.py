@@ -39,3 +39,15 @@ def test_the_digest_sees_statements_but_no_comments(tmp_path, monkeypatch):
 def test_the_digest_follows_the_figure_modules_that_a_figure_imports():
     files = [path.name for path in code._figure_files("figures.gris_f07")]
     assert files == ["gris_f07.py"]
+
+
+def test_the_digest_sees_the_numbers_beside_a_module(tmp_path, monkeypatch):
+    package = tmp_path / "other_world"
+    package.mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    (package / "__init__.py").write_text("")
+    found = []
+    for number in (1.0, 1.0, 2.0):
+        np.savez(package / "__init__.npz", number=number)
+        found.append(code.digest("figures.gris_f02", "other_world"))
+    assert found[0] == found[1] != found[2]
