@@ -69,7 +69,7 @@ def check(a: Arrays) -> list[Claim]:
 
 SETTING = (
     "Offline at equal rays, in a row of pixels; the paper's renderers are real-time, at equal time, with tiles of "
-    "4 x 4 pixels and direct light by ReSTIR DI, of which there is none here."
+    "16 pixels and direct light by ReSTIR DI, of which there is none here."
 )
 
 

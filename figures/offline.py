@@ -14,6 +14,7 @@ import numpy as np
 from figures.figure import Arrays
 from figures.flatland import HYBRID, Renderer, estimates, means, offline, path_tracing, view
 from figures.references import reference
+from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.loop import OFFLINE
@@ -24,7 +25,7 @@ from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
 UNIT = 4
 """Path trees in one stored image of path tracing."""
 
-TREES_PER_SECOND_OF_OURS = 72
+TREES_IN_A_FRAMES_TIME = 72
 """Path trees that take as long as one offline frame per pixel: median over scenes of `make bench`, CPU time."""
 
 
@@ -62,10 +63,10 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     return render(METHODS[chunk["method"]], chunk["scene"], preset[chunk["method"]], rng)
 
 
-def render(method: Method, scene: str, count: int, rng: np.random.Generator) -> Arrays:
-    """Independent images (count, 128) and rays per pixel of one."""
+def render(method: Method, scene: str, count: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
+    """Independent images (count, n) of the scene's inset, or of another sensor, and rays per pixel of one."""
     asked = Counter[str]()
-    of = view(scene, method.rule, asked, integrals=method.integrals)
+    of = view(scene, method.rule, asked, sensor, method.integrals)
     found = estimates(method.render, of, asked, count, Live(rng))
     return {"images": found.images, "rays": np.array(found.rays)}
 
@@ -95,6 +96,9 @@ def traced(a: Arrays, scene: str, trees: float) -> Array:
     return means(a[f"{scene}.path tracing.images"], int(np.ceil(trees / UNIT)))
 
 
+DIRECT = "The paper renders indirect light only; here direct light is part of the image."
+
+
 def equal_samples(T: int) -> float:
     """Trees of T frames."""
     return float(T * OFFLINE.trees)
@@ -108,7 +112,7 @@ def equal_rays(a: Arrays, scene: str, method: str, T: int) -> float:
 
 def equal_time(T: int) -> float:
     """Trees that take as long as T frames."""
-    return float(T * TREES_PER_SECOND_OF_OURS)
+    return float(T * TREES_IN_A_FRAMES_TIME)
 
 
 def paired(errors: Array, others: Array) -> tuple[Array, Array]:

@@ -120,17 +120,18 @@ def _check_points(*points: Sequence[float]) -> None:
             raise ValueError(f"a point of the plane has 2 coordinates, but this one is {point}.")
 
 
-def facing(scene: Scene, sensor: Sensor) -> Array:
-    """What the middle of each pixel sees: 1 the front of a surface, -1 a back, 0 nothing; (n,)."""
+def facing(scene: Scene, sensor: Sensor, at: float = 0.5) -> Array:
+    """What each pixel sees where all its numbers are `at`: 1 the front of a surface, -1 a back, 0 nothing; (n,)."""
     pixel = np.arange(sensor.n)
-    x, w, _ = sensor.ray(pixel, np.full((sensor.numbers, sensor.n), 0.5))
+    x, w, _ = sensor.ray(pixel, np.full((sensor.numbers, sensor.n), at))
     v, _, met = arrive(scene, x, w)
     return np.asarray(np.where(v.front, 1, -1) * met)
 
 
 def check_view(scene: Scene, sensor: Sensor) -> None:
     """Raise ValueError if no pixel sees the front of a surface: the sensor is inside a solid, or out of doors."""
-    if not (facing(scene, sensor) > 0).any():
+    directions = (np.arange(8) + 0.5) / 8
+    if not any((facing(scene, sensor, at) > 0).any() for at in directions):
         raise ValueError(
             f"{sensor} sees only backs of surfaces, or nothing: it stands in a solid or outside the room. "
             f"Move it, or turn the facets round: their fronts are on the left of the way from corner to corner."

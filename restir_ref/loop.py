@@ -61,7 +61,10 @@ def frame(
 
 
 def random_in_row(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
-    """Neighbours uniform in -radius .. radius of a row of n pixels, mirrored at its ends."""
+    """Neighbours uniform in -radius .. radius of a row of n pixels, mirrored at its ends.
+
+    Within radius / 2 of an end a mirrored one can be the pixel itself, which is unbiased, only no news.
+    """
     return [_moved(of, index, u, radius) for u in chance.uniform((count, len(index)))]
 
 
@@ -74,7 +77,7 @@ def spread_in_row(of: Image, index: Array, count: int, radius: float, chance: Ch
 def alike_in_row(alike: Array) -> Around:
     """Random neighbours within the radius among those that see alike, alike (n, n) bool; else the pixel itself.
 
-    A choice by G-buffers, never by samples.  [GRIS 6.2; Bitterli 2020]
+    A choice by G-buffers, never by samples.  [Bitterli 2020]
     """
     distance = np.abs(np.subtract.outer(np.arange(len(alike)), np.arange(len(alike))))
 

@@ -102,6 +102,13 @@ def test_a_still_camera_takes_every_pixel_from_itself() -> None:
     assert (sources(motion(SCENES["occluders"]().scene, now, now), np.arange(3840)) == np.arange(3840)).all()
 
 
+def test_a_crop_that_grows_finds_history_only_where_the_smaller_one_was() -> None:
+    before = Pinhole((0.5, 0.6), (0.5, 0.0), 32, 0.5, first=900)
+    m = motion(SCENES["furnace"]().scene, replace(before, n=64), before)
+    assert m.seen[:32].all()
+    assert not m.seen[32:].any()
+
+
 # ---------------------------------------------------------------- temporal reuse behind posts
 
 REPLICAS = 600

@@ -1,18 +1,25 @@
 """Path reuse in tiles: an exact law of Lambert surfaces, and no bias against radiosity and its own trees."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from figures.criteria import sidak, unbiased
-from flatland2d import SCENES
+from flatland2d import PLANE, SCENES, Pinhole
+from flatland2d.scenes import LAMP, chain, matte, room
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.transport import path_reuse as module
 from restir_ref.transport.counting import SHADOW, counted
+from restir_ref.transport.inversion import traced
+from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.path_reuse import TILE, Shared, TileIntegrals, not_shared, path_reuse, shareable
 from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
+from restir_ref.transport.scene import Facet
+from restir_ref.transport.scene import scene as compiled
+from restir_ref.transport.shifts import shift_path
 from tests.flatland.truths import radiosity
 
 
@@ -97,6 +104,52 @@ def largest_z(scene: str, replicas: int, seed: int) -> tuple[float, float]:
 def test_path_reuse_changes_no_pixel_s_mean(scene) -> None:
     z, limit = largest_z(scene, 2048, seed=4)
     assert z < limit
+
+
+# ---------------------------------------------------------------- one tile in rooms made for it
+
+
+def one_tile(walls: Material, facets: list[Facet], eye: tuple[float, float] = (0.4, 0.6)) -> Tracer:
+    """Sixteen pixels that look down."""
+    return Tracer(compiled(PLANE, [walls], facets), Pinhole(eye, (0.5, 0.0), TILE, film=TILE), 3, RECONNECTION)
+
+
+@pytest.mark.claims("COM-B02")
+def test_a_tile_that_sees_both_sides_of_a_thin_wall_hands_its_light_out_whole() -> None:
+    thin = [*room(0), *chain([(0.5, 0.0), (0.5, 0.5)], 0), *chain(LAMP, 0, 8.0)]
+    reused, alone = with_and_without(one_tile(matte(0.5), thin, (0.5, 0.9)), 64, 1)
+    assert np.abs((reused - alone).sum(axis=1)).max() < 1e-12 * alone.sum(axis=1).mean()
+
+
+@pytest.mark.claims("COM-B02")
+def test_pixels_of_a_tile_see_of_a_sample_the_f_over_p_that_shifts_to_them_find() -> None:
+    t, columns = one_tile(Material([Layer("ggx", (0.9,), 0.6)]), room(0, emission=1.0)), np.arange(TILE)
+    t = replace(t, depth=2)
+    tree = trace(t, np.random.default_rng(2).random((t.D, TILE)), columns)
+    _, (seen, _) = TileIntegrals(t, tree).candidates(columns, Live(np.random.default_rng(0)))
+    x, found = traced(t, tree.u, columns, np.full(TILE, 2), np.zeros(TILE, dtype=bool)), 0
+    for j in columns:
+        of_pixel_j = np.concatenate([np.full((1, TILE), tree.u[0, j]), x.u[1:]])
+        y, J = shift_path(t, replace(x, u=of_pixel_j), np.full(TILE, j))
+        both = (J > 0) & (seen.p[j] > 0) & (y.F[0] > 0)
+        assert seen.f[j, 0, both] / seen.p[j, both] == pytest.approx(y.F[0, both], rel=1e-9)
+        found += both.sum()
+    assert found > TILE
+
+
+@pytest.mark.claims("COM-B02")
+def test_black_lobes_take_no_part() -> None:
+    """A furnace of albedo .5, half of whose samples would go to a black lobe."""
+    black = Material([Layer("lambert", (0.5,), weight=0.5), Layer("lambert", (0.0,), weight=0.5)])
+    images, _ = with_and_without(one_tile(black, room(0, emission=1.0)), 2500, 1)
+    means = images.mean(axis=1)
+    error = means.std(ddof=1) / np.sqrt(len(means))
+    truth = 1 + 0.5 + 0.5**2 + 0.5**3
+    assert error < 0.003 * truth
+    assert abs(means.mean() - truth) < 4 * error
+
+
+# ---------------------------------------------------------------- cost, and what cannot be tiled
 
 
 def test_a_tile_is_connected_once() -> None:

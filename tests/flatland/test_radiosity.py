@@ -1,18 +1,21 @@
 """Radiosity against closed forms, against rays, against itself refined, and path tracing against it."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from figures.references import reference
-from flatland2d import SCENES, radiosity
+from flatland2d import PLANE, SCENES, Pinhole, radiosity
 from flatland2d.radiosity import cut, gather, render, shares
-from flatland2d.scenes import FURNACE_ALBEDO, INSET, Setting
+from flatland2d.scenes import FURNACE_ALBEDO, INSET, LAMP, Setting, chain, matte, room
 from restir_ref.batch import Array
 from restir_ref.transport import paths
+from restir_ref.transport.materials import Material
 from restir_ref.transport.paths import RECONNECTION, Tracer, trace
-from restir_ref.transport.scene import Scene
+from restir_ref.transport.scene import Facet, Scene
+from restir_ref.transport.scene import scene as compiled
 from restir_ref.transport.vectors import dot, norm
 
 LAMBERT = ("matte_cornell", "ajar", "crease", "occluders", "checker", "rack")
@@ -83,6 +86,29 @@ def test_a_furnace_has_its_closed_form() -> None:
     setting = SCENES["furnace"]()
     image = render(setting.scene, setting.pinhole(4), setting.depth, per_segment=16, film=4)
     assert image == pytest.approx(truncated_furnace(setting.depth), rel=1e-12)
+
+
+def inside(sensor: Pinhole, materials: list[Material], *facets: Facet) -> Array:
+    """A room of the first material with these facets, seen by `sensor`."""
+    return render(compiled(PLANE, materials, [*room(0), *facets]), sensor, 3, per_segment=8, film=2)
+
+
+ABOVE = Pinhole((0.5, 0.9), (0.5, 0.0), 8, 0.1, film=8)
+
+
+def test_the_back_of_a_lamp_is_dark() -> None:
+    black = [matte(0.5), matte(0.0)]
+    back, front = chain([(0.6, 0.5), (0.4, 0.5)], 1, 8.0), chain([(0.4, 0.5), (0.6, 0.5)], 1, 8.0)
+    assert not inside(ABOVE, black, *back).any()
+    assert inside(ABOVE, black, *front) == pytest.approx(8.0)
+
+
+def test_backs_of_walls_are_lit_like_fronts() -> None:
+    ends = [(0.2, 0.3), (0.8, 0.3)]
+    wide, lamp = replace(ABOVE, half=0.6), chain(LAMP, 0, 8.0)
+    a, b = (inside(wide, [matte(0.5)], *lamp, *chain(shelf, 0)) for shelf in (ends, ends[::-1]))
+    assert a.all()
+    assert a == pytest.approx(b, rel=1e-9)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 8, 13, 21, 60])

@@ -1,14 +1,16 @@
-"""The one predicate of connections, and rays that leave the scene."""
+"""The one predicate of connections, what shifts connect, and rays that leave the scene."""
 
 import numpy as np
 import pytest
 
-from flatland2d.space import PLANE
+from flatland2d import PLANE, SCENES
+from restir_ref.batch import take
+from restir_ref.transport.inversion import connection
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Tracer, connectable, leaves, trace
-from restir_ref.transport.rays import arrive
+from restir_ref.transport.rays import GRAZING, arrive
 from restir_ref.transport.scene import Facet, scene
-from tests.transport.paths import HYBRID
+from tests.transport.paths import HYBRID, RULES, shifts
 
 
 def connects(rule: Connectability, r_x: float, r_z: float, distance: float) -> bool:
@@ -30,6 +32,16 @@ def test_the_verdict_is_the_same_from_either_end_and_never_for_delta_lobes(rule)
     assert (connectable(rule, r_x, r_z, distance) == connectable(rule, r_z, r_x, distance)).all()
     assert not connectable(rule, 0 * r_x, r_z, distance).any()
     assert not connectable(REPLAY, r_x, r_z, distance).any()
+
+
+@pytest.mark.parametrize("rule", ["hybrid", "reconnection"])
+def test_no_shift_connects_along_a_surface(rule) -> None:
+    s = shifts(SCENES["cornell"](), RULES[rule], 20_000, seed=3, reach=400)
+    met = np.flatnonzero((s.J > 0) & (s.x.c > 0))
+    at = connection(s.t, take(s.y, met), s.j[met])
+    cosines = s.t.scene.space.to_local(at.v.n, at.w)[1], at.z.o[1]
+    assert len(met) > 1000
+    assert np.abs(cosines).min() > GRAZING
 
 
 class Down:
