@@ -121,7 +121,6 @@ def test_a_tile_that_sees_both_sides_of_a_thin_wall_hands_its_light_out_whole() 
     assert np.abs((reused - alone).sum(axis=1)).max() < 1e-12 * alone.sum(axis=1).mean()
 
 
-@pytest.mark.claims("COM-B02")
 def test_pixels_of_a_tile_see_of_a_sample_the_f_over_p_that_shifts_to_them_find() -> None:
     t, columns = one_tile(Material([Layer("ggx", (0.9,), 0.6)]), room(0, emission=1.0)), np.arange(TILE)
     t = replace(t, depth=2)
