@@ -96,14 +96,19 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
     arrays = {name(chunk): part["estimate"] for chunk, part in zip(chunks(preset), results, strict=True)}
     return arrays | {
         "n": np.array(preset["n"]),
-        **{f"M.{mis}": np.array(preset["M"][mis]) for mis in GROWING["whole film"]},
+        **{named("M", mis): np.array(preset["M"][mis]) for mis in GROWING["whole film"]},
     }
 
 
 def name(chunk: Any) -> str:
     """Of a chunk's array."""
     keys = ("step", "mis") if chunk["figure"] == 7 else ("apart", "mis", "M")
-    return ".".join(str(chunk[key]) for key in keys)
+    return named(*(chunk[key] for key in keys))
+
+
+def named(*parts: object) -> str:
+    """Parts joined by dots; 1/Z without its stroke, which names of arrays may not have."""
+    return ".".join(str(part) for part in parts).replace("/", " over ")
 
 
 def variance(a: Arrays, key: str) -> Array:
@@ -117,15 +122,15 @@ def check(a: Arrays) -> list[Claim]:
     claims = []
     for step in STEP:
         for mis in PROPER:
-            line = criteria.slope_within(a["n"], variance(a, f"{step}.{mis}"), -1, 0.1, decades=1.8)
+            line = criteria.slope_within(a["n"], variance(a, named(step, mis)), -1, 0.1, decades=1.8)
             claims.append(Claim("GRIS-F07", line, f"flatland, {step}, {mis}: slope over n = 1 .. 64"))
     return [*claims, *(grown(a, mis) for mis in GROWING["whole film"])]
 
 
 def grown(a: Arrays, mis: str) -> Claim:
     """Whether the whole film is a worse window than the best one, by a bootstrap over replicas."""
-    M = a[f"M.{mis}"]
-    square = {int(m): squared(a[f"whole film.{mis}.{m}"]) for m in M}
+    M = a[named("M", mis)]
+    square = {int(m): squared(a[named("whole film", mis, m)]) for m in M}
     best = min(square, key=lambda m: square[m].mean())
     ratio = criteria.ratio_above(square[int(M[-1])], square[best], 1)
     part = f"flatland, {mis}: Var of a window of {M[-1]} / of {best}, the best"
@@ -148,13 +153,13 @@ def draw(a: Arrays) -> "Picture":
     picture, axes = style.panels(1, 3, width=3.7, height=3.1)
     for axis, step in zip(axes[0], STEP, strict=False):
         for mis in WEIGHTS:
-            axis.loglog(a["n"], variance(a, f"{step}.{mis}"), label=mis)
+            axis.loglog(a["n"], variance(a, named(step, mis)), label=mis)
         axis.set(xlabel="samples n per pixel", ylabel="relative variance of f(Y) W", title=f"Seven {step}")
     axes[0, 0].legend()
     for apart, weights in GROWING.items():
         for mis in weights:
-            M = a[f"M.{mis}"]
-            axes[0, 2].loglog(M, [variance(a, f"{apart}.{mis}.{m}") for m in M], label=f"{mis}, {apart}")
+            M = a[named("M", mis)]
+            axes[0, 2].loglog(M, [variance(a, named(apart, mis, m)) for m in M], label=f"{mis}, {apart}")
     axes[0, 2].set(xlabel="pixels M in the window", ylabel="relative variance of f(Y) W", title="One canonical sample")
     axes[0, 2].legend()
     return picture
