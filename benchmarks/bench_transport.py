@@ -18,7 +18,7 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from bench_resampling import Row, keep_freed_memory
+from bench_resampling import Row, keep_freed_memory, print_sections
 
 from flatland2d.motion import motion, sources
 from flatland2d.scenes import INSET, SCENES
@@ -47,14 +47,7 @@ def main(arguments: Sequence[str]) -> int:
     keep_freed_memory()
     if "--profile" in arguments:
         return profile()
-    missed = 0
-    for title, rows in SECTIONS.items():
-        print(f"\n{title}")
-        for row in rows():
-            print(row, flush=True)
-            missed += not row.met
-    print(f"\n{missed} requirements missed" if missed else "\nall requirements met")
-    return int(missed > 0)
+    return print_sections(SECTIONS)
 
 
 def cpu(runs: Mapping[Any, Run], repeats: int = REPEATS) -> dict[Any, float]:

@@ -28,6 +28,20 @@ HYBRID = Connectability(0.2, 0.02)
 
 RULES: Mapping[str, Connectability] = MappingProxyType({"reconnection": RECONNECTION, "hybrid": HYBRID})
 
+TEN = (
+    "cornell",
+    "glossy_cornell",
+    "ajar",
+    "crease",
+    "occluders",
+    "checker",
+    "rack",
+    "glass_disc",
+    "distant_caustic",
+    "clear_coat",
+)
+"""Scenes FS1 to FS10."""
+
 COLUMNS = 2**14
 """Columns rendered at once: what fits the cache."""
 

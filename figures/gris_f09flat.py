@@ -171,8 +171,10 @@ def ratio(errors: Array, others: Array, limit: float) -> criteria.Outcome:
     return criteria.ratio_above(errors[:R], others[:R], limit)
 
 
-MANY = 3000
-"""Frames after which the mean of a chain is judged by its slope: after fewer the curve still bends, as is drawn."""
+EARLY = (
+    "Chains of 1000 frames are too short and too few for it: with other seeds the slope was -.67 to -.99. Chains of "
+    "3000 frames (paper preset) gave -.91."
+)
 
 
 def _of_means(a: Arrays) -> list[Claim]:
@@ -181,9 +183,8 @@ def _of_means(a: Arrays) -> list[Claim]:
         t, error = a[f"t_mean.{k}"], a[f"mean.{k}"].mean(axis=1)
         last = t >= t[t <= t[-1] / 10].max()
         outcome = criteria.slope_within(t[last], error[last], -1, 0.15, decades=1)
-        if k == SPATIAL or t[-1] >= MANY:
-            part = f"rough Cornell box, {name}: slope of the mean's relMSE, last decade"
-            claims.append(Claim("GRIS-F09b", outcome, part))
+        part = f"rough Cornell box, {name}: slope of the mean's relMSE, last decade"
+        claims.append(Claim("GRIS-F09b", outcome, part, reason="" if outcome.passed else EARLY))
     T = np.intersect1d(a["t_mean.0"], a["t_mean.3"])[-1]
     spatial, capped = (a[f"mean.{k}"][list(a[f"t_mean.{k}"]).index(T)][:8] for k in (SPATIAL, 3))
     better = criteria.ratio_below(spatial, capped, 0.5)

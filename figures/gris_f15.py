@@ -11,24 +11,13 @@ import numpy as np
 
 from figures import criteria, realtime, split_light, style
 from figures.figure import Arrays, Claim, Figure
+from figures.flatland import TEN
 from figures.references import reference
 from restir_ref.metrics import mape
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
 
-SCENES = (
-    "cornell",
-    "glossy_cornell",
-    "ajar",
-    "crease",
-    "occluders",
-    "checker",
-    "rack",
-    "glass_disc",
-    "distant_caustic",
-    "clear_coat",
-)
 PARTS = ("direct", "indirect", "trees")
 LEAST, LOW, HIGH = 0.10, 0.24, 0.75
 """Reduction in every scene, and the printed range, in which the median shall lie."""
@@ -36,7 +25,7 @@ LEAST, LOW, HIGH = 0.10, 0.24, 0.75
 
 def chunks(preset: Any) -> Sequence[dict[str, str]]:
     """One per scene and part of the light."""
-    return [{"scene": scene, "part": part} for scene in SCENES for part in PARTS]
+    return [{"scene": scene, "part": part} for scene in TEN for part in PARTS]
 
 
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
@@ -48,7 +37,7 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
 def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
     """MAPE of whole images, (scene, replica) each, rays per pixel and trees at equal rays, (scene,)."""
     parts, rows = iter(results), []
-    for scene in SCENES:
+    for scene in TEN:
         truth = reference(scene).mean
         direct, ours, trees = next(parts), next(parts), next(parts)
         rest = {
@@ -66,7 +55,7 @@ def check(a: Arrays) -> list[Claim]:
     """A reduction in every scene, and its median in the printed range."""
     found = reductions(a, "rays")
     worst = int(found.argmin())
-    part = f"least reduction of MAPE, {SCENES[worst]}"
+    part = f"least reduction of MAPE, {TEN[worst]}"
     return [
         Claim("GRIS-F15", criteria.Outcome(float(found[worst]), f"≥ {LEAST:g}", bool(found[worst] >= LEAST)), part),
         Claim("GRIS-F15", criteria.between(np.median(found), LOW, HIGH), "median reduction over ten scenes"),
@@ -82,14 +71,14 @@ def draw(a: Arrays) -> "Picture":
     """Reductions per scene, and the errors behind them."""
     picture, axes = style.panels(1, 2, width=5.0, height=3.6)
     left, right = axes[0]
-    y = np.arange(len(SCENES))[::-1]
+    y = np.arange(len(TEN))[::-1]
     left.axvspan(LOW, HIGH, color="#dddddd", zorder=0, label="printed range")
     left.axvline(LEAST, color="k", ls=":", marker="", lw=1, label="least")
     left.barh(y + 0.2, reductions(a, "rays"), 0.38, color="#0072B2", label="equal rays")
     left.barh(
         y - 0.2, reductions(a, "time"), 0.38, color="#ffffff", edgecolor="#0072B2", hatch="//", label="equal time"
     )
-    left.set_yticks(y, SCENES)
+    left.set_yticks(y, TEN)
     left.grid(visible=False, axis="y")
     left.set_xlim(min(0, reductions(a, "time").min() - 0.02), 1)
     most = (a["rays"].mean(axis=1) / a["restir"].mean(axis=1)).max()
@@ -103,7 +92,7 @@ def draw(a: Arrays) -> "Picture":
         spread = 1.96 * e.std(axis=1, ddof=1) / np.sqrt(e.shape[1])
         right.errorbar(e.mean(axis=1), y + dy, xerr=spread, ls="", label=label, markevery=1, **look)
     right.set_xscale("log")
-    right.set_yticks(y, [f"{a['rays_ours'][k]:.0f} / {a['rays_tree'][k]:.1f}" for k in range(len(SCENES))])
+    right.set_yticks(y, [f"{a['rays_ours'][k]:.0f} / {a['rays_tree'][k]:.1f}" for k in range(len(TEN))])
     right.set(xlabel="MAPE of the whole image (bars: 95%)", ylabel="rays: our frame / a tree", title="Errors")
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
     return picture

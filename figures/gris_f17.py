@@ -11,25 +11,13 @@ import numpy as np
 
 from figures import criteria, offline, style
 from figures.figure import Arrays, Claim, Figure
-from figures.flatland import means
+from figures.flatland import TEN, means
 from restir_ref.batch import Array
 from restir_ref.metrics import mape, rel_mse
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
 
-SCENES = (
-    "cornell",
-    "glossy_cornell",
-    "ajar",
-    "crease",
-    "occluders",
-    "checker",
-    "rack",
-    "glass_disc",
-    "distant_caustic",
-    "clear_coat",
-)
 SIX = ("cornell", "glossy_cornell", "ajar", "glass_disc", "distant_caustic", "clear_coat")
 """Scenes of the comparison to equal error; the others are about gradients and geometry."""
 
@@ -133,7 +121,7 @@ WHY = (
 def shift_ratios(a: Arrays) -> Mapping[str, float]:
     """relMSE of hybrid over reconnection frames, by scene."""
     found = {}
-    for scene in SCENES:
+    for scene in TEN:
         by_shift = [rel_mse(a[f"{scene}.{m}.images"], a[f"{scene}.reference"]).mean() for m in METHODS[:1:-1]]
         found[scene] = float(by_shift[0] / by_shift[1])
     return found
@@ -168,7 +156,7 @@ def draw(a: Arrays) -> "Picture":
 
 def chunks(preset: Any) -> Sequence[dict[str, str]]:
     """Every scene and method; path reuse where it is compared."""
-    return [chunk for chunk in offline.chunks(SCENES, METHODS) if wanted(chunk)]
+    return [chunk for chunk in offline.chunks(TEN, METHODS) if wanted(chunk)]
 
 
 def wanted(chunk: Mapping[str, str]) -> bool:

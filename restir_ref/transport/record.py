@@ -1,5 +1,6 @@
 """From a traced tree and a chosen leaf to the path record: where it reconnects, and what its suffix carries."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,26 +54,26 @@ def record(t: Tracer, tree: Tree, k: Array, nee: Array, F: Array) -> Path:
     s = stacks(tree)
     before = np.maximum(c - 1, 0)
     through = (c > 0) & (c <= k) & ~(nee & (c == k))
-    lights = _stack([np.zeros_like(tree.u[: t.scene.space.d]), *(w for _, w in tree.lights)])
+    lights = np.stack([np.zeros_like(tree.u[: t.scene.space.d]), *(w for _, w in tree.lights)])
     inner = np.minimum(c, t.depth)
     out = np.where(through, _at(s.w, inner), _at(lights, k))
     A = _at(s.p, before) * _at(s.cos, c) / _at(s.r, c) ** (t.scene.space.d - 1)
     A = np.where(c > 0, A * np.where(through, _at(s.p, inner), 1), 1)
     S, p_light = _suffix(t, tree, s, k, nee, c)
     return Path(
-        tree.u,
-        k,
-        nee,
-        c,
-        _at(s.x, c),
-        _at(s.prim, c),
-        _at(s.lobe, before),
-        np.where(through, _at(s.lobe, inner), 0),
-        out,
-        S,
-        p_light,
-        A,
-        F,
+        u=tree.u,
+        k=k,
+        nee=nee,
+        c=c,
+        z=_at(s.x, c),
+        prim=_at(s.prim, c),
+        lobe_in=_at(s.lobe, before),
+        lobe_out=np.where(through, _at(s.lobe, inner), 0),
+        out=out,
+        S=S,
+        p_light=p_light,
+        A=A,
+        F=F,
     )
 
 
@@ -114,14 +115,9 @@ def _suffix(t: Tracer, tree: Tree, s: Stacks, k: Array, nee: Array, c: Array) ->
     return S, p_light
 
 
-def _stack(parts: list[Array]) -> Array:
-    return np.stack(parts)
-
-
-def _padded(parts: object) -> Array:
+def _padded(parts: Sequence[Array]) -> Array:
     """Stack arrays with a copy of the first in front, so that index i is vertex i."""
-    listed = list(parts)  # type: ignore[call-overload]
-    return np.stack([listed[0], *listed])
+    return np.stack([parts[0], *parts])
 
 
 def _at(stack: Array, i: Array) -> Array:
