@@ -1,25 +1,49 @@
 """A digest of the code that a figure's chunks depend on, so that results of older code are computed again.
 
-It covers the theory, the figure's world, and the figure's module with the figure modules that it imports, each with the
-numbers in an `.npz` of its name.  Comments and layout do not count.
+It covers the theory, the figure's world, and of the figure modules what `chunks` and `compute` reach, name by name,
+with the numbers in an `.npz` beside a module.  Comments and layout do not count, nor does what runs after the chunks.
 """
 
 import ast
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-ENGINE = frozenset({"figures.criteria", "figures.figure", "figures.style"})  # they judge and draw, after the chunks
+COMPUTING = frozenset({"chunks", "compute"})
+JUDGING = COMPUTING | {"combine", "check"}
+WHOLE = "*"
+"""Stands for every name of a module."""
+
+Place = tuple[str, str]  # module, name
+
+
+@dataclass(frozen=True)
+class Source:
+    """A figure module: its file, the statements that bind each of its names, and what it imports from others."""
+
+    path: Path
+    binding: Mapping[str, list[ast.stmt]]
+    imported: Mapping[str, Place]
 
 
 def digest(module: str, world: str) -> str:
     """SHA-256, shortened, over the syntax trees of everything that computes the chunks of `module`."""
+    files = [path for name in ("restir_ref", world) for path in _package(name)]
+    return _sum([*(part for path in files for part in (_syntax(path), _data(path))), *_reached(module, COMPUTING)])
+
+
+def own(module: str) -> str:
+    """The same over figure modules alone, with what judges: on what a verdict depends besides theory and world."""
+    return _sum(_reached(module, JUDGING))
+
+
+def _sum(parts: Iterable[bytes]) -> str:
     total = hashlib.sha256()
-    for path in [*_package("restir_ref"), *_package(world), *_figure_files(module)]:
-        total.update(_syntax(path))
-        total.update(_data(path.with_suffix(".npz")))
+    for part in parts:
+        total.update(part)
     return total.hexdigest()[:16]
 
 
@@ -30,7 +54,8 @@ def _syntax(path: Path) -> bytes:
 
 def _data(path: Path) -> bytes:
     """Numbers that a module keeps in a file of its own name, such as reference images."""
-    return hashlib.sha256(path.read_bytes()).digest() if path.exists() else b""
+    numbers = path.with_suffix(".npz")
+    return hashlib.sha256(numbers.read_bytes()).digest() if numbers.exists() else b""
 
 
 @cache
@@ -41,22 +66,97 @@ def _package(name: str) -> tuple[Path, ...]:
     return tuple(path for folder in folders for path in sorted(Path(folder).rglob("*.py")))
 
 
-def _figure_files(module: str) -> Iterator[Path]:
-    """The module's file and those of the figure modules that it imports, each once."""
-    seen, to_read = {module}, [module]
-    while to_read:
-        spec = find_spec(to_read.pop())
-        if spec is None or spec.origin is None:
-            continue
-        path = Path(spec.origin)
-        yield path
-        new = sorted(_imported(path) - seen - ENGINE)
-        seen.update(new)
-        to_read += new
+# ---------------------------------------------------------------- what a figure uses
 
 
-def _imported(path: Path) -> set[str]:
-    """Modules below `figures` that a file imports by `from figures.x import y` or `from figures import x`."""
-    nodes = [node for node in ast.walk(ast.parse(path.read_bytes())) if isinstance(node, ast.ImportFrom)]
-    names = {node.module for node in nodes if node.module and node.module.startswith("figures.")}
-    return names | {f"figures.{alias.name}" for node in nodes if node.module == "figures" for alias in node.names}
+def _reached(module: str, roots: frozenset[str]) -> Iterator[bytes]:
+    """The statements that the named functions of a figure use, module by module, and the numbers beside each module."""
+    places = _closure(list(_called(module, roots)))
+    for each in sorted({where for where, _ in places}):
+        source = _source(each)
+        used = {id(node): node for where, name in places if where == each for node in source.binding.get(name, [])}
+        yield from (ast.dump(node).encode() for node in sorted(used.values(), key=lambda node: node.lineno))
+        yield _data(source.path)
+
+
+def _called(module: str, roots: frozenset[str]) -> Iterator[Place]:
+    """What the roots' arguments of `FIGURE = Figure(...)` name; everything where it is made in another way."""
+    for statement in _source(module).binding.get("FIGURE", []):
+        call = getattr(statement, "value", None)
+        arguments = {each.arg: each.value for each in call.keywords} if isinstance(call, ast.Call) else {}
+        if roots <= set(arguments):
+            yield from (place for root in roots for place in _named(module, arguments[root]))
+            return
+    yield module, WHOLE
+
+
+def _closure(places: list[Place]) -> set[Place]:
+    """The places and all that they use, directly or not."""
+    seen: set[Place] = set()
+    while places:
+        place = places.pop()
+        if place not in seen:
+            seen.add(place)
+            places += _used(*place)
+    return seen
+
+
+def _used(module: str, name: str) -> Iterator[Place]:
+    """What one name of a module uses."""
+    source = _source(module)
+    if name == WHOLE:
+        yield from ((module, each) for each in [*source.binding, *source.imported])
+    if name in source.imported:
+        yield source.imported[name]
+    for node in source.binding.get(name, []):
+        yield from _named(module, node)
+
+
+def _named(module: str, node: ast.AST) -> Iterator[Place]:
+    """What an expression or statement of a module names: names beside it, and names of other figure modules."""
+    source = _source(module)
+    for name, attribute in _names(node):
+        there, what = source.imported.get(name, (module, name))
+        if what == WHOLE and attribute:
+            yield there, attribute
+        elif name in source.imported or name in source.binding:
+            yield module, name
+
+
+def _names(node: ast.AST) -> Iterator[tuple[str, str]]:
+    """Names in an expression or statement, each with the attribute asked of it, if there is one."""
+    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+        yield node.value.id, node.attr
+        return
+    if isinstance(node, ast.Name):
+        yield node.id, ""
+    for child in ast.iter_child_nodes(node):
+        yield from _names(child)
+
+
+@cache
+def _source(module: str) -> Source:
+    """A figure module, read."""
+    spec = find_spec(module)
+    path = Path(spec.origin or "") if spec else Path()
+    binding: dict[str, list[ast.stmt]] = {}
+    imported: dict[str, Place] = {}
+    for node in ast.parse(path.read_bytes()).body:
+        for name in _bound(node):
+            binding.setdefault(name, []).append(node)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "figures":
+            imported |= {alias.asname or alias.name: _place(node.module or "", alias.name) for alias in node.names}
+    return Source(path, binding, imported)
+
+
+def _place(module: str, name: str) -> Place:
+    """`from figures import x` is all of figures.x, `from figures.x import y` one name of it."""
+    return (f"{module}.{name}", WHOLE) if module == "figures" else (module, name)
+
+
+def _bound(node: ast.stmt) -> Iterator[str]:
+    """The names that a statement of a module binds, imports aside."""
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        yield node.name
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    yield from (each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name))

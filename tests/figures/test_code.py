@@ -36,9 +36,49 @@ def test_the_digest_sees_statements_but_no_comments(tmp_path, monkeypatch):
     assert found[0] == found[1] != found[2]
 
 
-def test_the_digest_follows_the_figure_modules_that_a_figure_imports():
-    files = [path.name for path in code._figure_files("figures.gris_f07")]
-    assert files == ["gris_f07.py"]
+MODULE = """
+from figures import offline
+from figures.flatland import view
+
+SCALE, UNUSED = 2.0, 3.0
+
+def chunks(preset): return [{}]
+def compute(preset, chunk, *, rng): return {"x": SCALE * offline.equal_samples(1)}
+def combine(preset, parts): return parts[0]
+def check(a): return judge(a)
+def judge(a): return []
+def draw(a): return view
+
+FIGURE = Figure(chunks=chunks, compute=compute, combine=combine, check=check, draw=draw, id="A-1")
+"""
+CHANGES = {
+    "a constant of compute": ("SCALE, UNUSED = 2.0", "SCALE, UNUSED = 2.5", {"digest", "own"}),
+    "chunks": ("[{}]", "[{}, {}]", {"digest", "own"}),
+    "what another module gives": ("equal_samples", "equal_time", {"digest", "own"}),
+    "how it is joined": ("parts[0]", "parts[1]", {"own"}),
+    "how it is judged": ("return []", "return [1]", {"own"}),
+    "the picture": ("return view", "return None", set()),
+    "the id": ('"A-1"', '"A-2"', set()),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "seen"), CHANGES.values(), ids=CHANGES)
+def test_a_digest_sees_what_runs_before_it_is_asked_and_nothing_else(tmp_path, monkeypatch, old, new, seen):
+    monkeypatch.syspath_prepend(tmp_path)
+    digests = {"digest": lambda: code.digest("some_figure", "toy1d"), "own": lambda: code.own("some_figure")}
+    found = {name: [] for name in digests}
+    for text in (MODULE, MODULE.replace(old, new)):
+        (tmp_path / "some_figure.py").write_text(text)
+        code._source.cache_clear()
+        for name, digest in digests.items():
+            found[name].append(digest())
+    code._source.cache_clear()
+    assert {name for name, (before, after) in found.items() if before != after} == seen
+
+
+def test_a_figure_that_another_function_makes_counts_as_a_whole():
+    demo = "tests.figures.demos.sound"
+    assert list(code._called(demo, code.COMPUTING)) == [(demo, code.WHOLE)]
 
 
 def test_the_digest_sees_the_numbers_beside_a_module(tmp_path, monkeypatch):
