@@ -26,7 +26,7 @@ HYPOTHESIS_PROFILE ?= ci
 export HYPOTHESIS_PROFILE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup figures figures-paper test lint check notebooks evidence bench clean
+.PHONY: help setup figures figures-paper test lint audit check notebooks evidence bench clean
 
 help:  ## list the targets
 	@echo 'usage: make TARGET [ARGS="..."] [JOBS=2] [OUT=out] [PYTHON=python3]'
@@ -39,8 +39,9 @@ figures: $(STAMP)  ## draw every figure small, check its claims, write the repor
 	$(PY) -m figures report --out $(OUT)
 
 figures-paper: OUT := $(OUT)-paper
-figures-paper: $(STAMP)  ## the same at the papers' sample counts, into out-paper/
-	$(PY) -m figures run --preset paper --jobs $(JOBS) --out $(OUT) $(ARGS)
+figures-paper: $(STAMP)  ## the same at the papers' sample counts, into out-paper/; hours, and verdicts are kept
+	$(PY) -m figures run --preset paper --jobs $(JOBS) --out $(OUT) $(ARGS); \
+	    status=$$?; $(PY) -m figures keep --out $(OUT) && exit $$status
 	$(PY) -m figures report --out $(OUT)
 
 test: $(STAMP)  ## run the laws; ARGS="-k name" runs some
@@ -51,7 +52,11 @@ lint: $(STAMP)  ## ruff and mypy --strict
 	$(PY) -m ruff format --check
 	$(PY) -m mypy --strict
 
-check: lint test  ## all that must pass before a change is handed in
+audit: $(STAMP)  ## do ledger, results in out/, kept paper runs and evidence fit? nothing may be stale
+	$(PY) -m figures audit --out $(OUT)
+	$(PY) benchmarks/evidence.py --stale
+
+check: lint figures test audit  ## all that must pass before a change is handed in
 
 notebooks: $(STAMP)-notebooks  ## open the notebooks in Jupyter; ARGS="--no-browser" on a machine without one
 	$(PY) -m jupyterlab notebooks $(ARGS)

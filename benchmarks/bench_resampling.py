@@ -40,12 +40,13 @@ SLOWEST = 0.45
 
 @dataclass(frozen=True)
 class Row:
-    """One measured number and the interval it must lie in."""
+    """One measured number and the interval it must lie in; `claims` are the rows of the ledger that it is about."""
 
     what: str
     value: float
     least: float = -np.inf
     most: float = np.inf
+    claims: str = ""
 
     @property
     def met(self) -> bool:
@@ -55,7 +56,8 @@ class Row:
     def __str__(self) -> str:
         bounds = [f"{sign} {bound:g}" for sign, bound in ((">=", self.least), ("<=", self.most)) if np.isfinite(bound)]
         verdict = ("ok" if self.met else "MISSED") if bounds else ""
-        return f"{self.value:12.4g}  {' '.join(bounds):>8}  {verdict:6}  {self.what}"
+        about = f"  [{self.claims}]" if self.claims else ""
+        return f"{self.value:12.4g}  {' '.join(bounds):>8}  {verdict:6}  {self.what}{about}"
 
 
 def main() -> int:

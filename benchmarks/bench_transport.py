@@ -174,12 +174,14 @@ def growth() -> Iterator[Row]:
 
 
 def speed() -> Iterator[Row]:
-    """COM-A08: pixel-frames per second on one core."""
-    for replicas, least in ((64, 2e4), (1, -np.inf)):
+    """Pixel-frames per second on one core."""
+    found = {}
+    for replicas in (64, 1):
         on = frames("cornell", STEP, replicas * INSET)
-        found = cpu({"frame": partial(real_time, on)})["frame"]
-        what = f"128 pixels, {replicas} replicas at once: pixel-frames per CPU-second, hybrid, moving (COM-A08)"
-        yield Row(what, replicas * INSET / found, least=least)
+        found[replicas] = replicas * INSET / cpu({"frame": partial(real_time, on)})["frame"]
+    what = "128 pixels of cornell, {} replicas at once: pixel-frames per CPU-second, hybrid, moving"
+    yield Row(what.format(64), found[64], least=2e4, claims="COM-A08")
+    yield Row(what.format(1), found[1])
 
 
 def profile() -> int:

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from figures import cluster, jobs, ledger, registry, report, run, scan, session, tables, verdicts
+from figures import audit, cluster, jobs, kept, ledger, registry, report, run, session, showings, tables, verdicts
 from figures.errors import FigureError
 from figures.figure import PRESETS
 from figures.jobs import Crew
 from figures.progress import DISABLE, Progress
 from figures.registry import Entry, Project
+from figures.verdicts import Judged
 
 SEED = 20220711
 FOLDER = Path("out")
@@ -57,6 +58,14 @@ def parser() -> argparse.ArgumentParser:
     _json_option(claims)
     _out_option(claims, "folder whose verdicts.json is read, if there is one")
     claims.set_defaults(command=_ledger)
+    keeping = commands.add_parser(
+        "keep", help="file the verdicts of a paper run in figures/paper.json", description=KEEP
+    )
+    _out_option(keeping, "folder of a paper run")
+    keeping.set_defaults(command=_keep)
+    auditing = commands.add_parser("audit", help="check that ledger, kept runs and results fit", description=AUDIT)
+    _out_option(auditing, "folder of results that are checked, if there is one")
+    auditing.set_defaults(command=_audit)
     return root
 
 
@@ -67,7 +76,13 @@ RUN = (
     "2 bad input or an unusable folder; 130 interrupted."
 )
 REPORT = "Rebuild verdicts.json and index.html from stored results; computes nothing."
-LEDGER = "Show every claim with its tests, the figures that declare it, and its newest verdict."
+KEEP = "File what finished figures of a paper run found: verdicts, digests and the commit; the others stay as they are."
+AUDIT = (
+    "Check that criteria name the scenes and worlds of their rows, that kept paper runs are not stale and are what the "
+    "ledger expects, and that stored results crash nowhere and drop no part of a claim. "
+    "Exit status 1 if anything is amiss."
+)
+LEDGER = "Show every claim with its tests, figures, evidence and benchmarks, by world, and its newest verdict."
 
 
 def _run_options(command: argparse.ArgumentParser) -> None:
@@ -133,9 +148,8 @@ def _run(options: argparse.Namespace, project: Project) -> int:
     progress = Progress(options.progress)
     with _crew(options, chosen, progress) as crew:
         request = session.Request(chosen, options.preset, options.seed, crew, options.out)
-        status, judged = run.run(request, rows, entries, progress)
-    print(tables.summary(judged, tables.crashes(options.out)))
-    print(f"report: {options.out / 'index.html'}")
+        status, judged = run.run(request, rows, entries, project.paper, progress)
+    _say(judged, project, options.out)
     return status
 
 
@@ -146,22 +160,41 @@ def _crew(options: argparse.Namespace, chosen: Sequence[Entry], progress: Progre
 
 
 def _report(options: argparse.Namespace, project: Project) -> int:
-    judged = report.write(options.out, ledger.load(project.ledger), registry.load(project.modules))
-    print(tables.summary(judged, tables.crashes(options.out)))
-    print(f"report: {options.out / 'index.html'}")
+    judged = report.write(options.out, ledger.load(project.ledger), registry.load(project.modules), project.paper)
+    _say(judged, project, options.out)
     return 0
+
+
+def _say(judged: Sequence[Judged], project: Project, out: Path) -> None:
+    """The summary of a folder of results, and where its report stands."""
+    misfits = report.misfits(out, ledger.load(project.ledger), registry.load(project.modules), project.paper)
+    print(tables.summary(judged, tables.crashes(out), misfits))
+    print(f"report: {out / 'index.html'}")
 
 
 def _ledger(options: argparse.Namespace, project: Project) -> int:
     rows, entries = ledger.load(project.ledger), registry.load(project.modules)
     _refuse(list(ledger.unknown(rows, entries.values())))
-    tests = scan.tests_by_claim(project.tests, rows)
-    figures, newest = registry.declared(entries), verdicts.read(options.out)
-    listing = [
-        tables.claim_row(row, tests[id_], sorted(figures.get(id_, ())), newest.get(id_)) for id_, row in rows.items()
-    ]
+    found, newest = showings.showings(project, rows, entries), verdicts.read(options.out)
+    paper = kept.verdicts(kept.read(project.paper), registry.declared(entries))
+    listing = [tables.claim_row(row, found[id_], newest.get(id_), paper.get(id_)) for id_, row in rows.items()]
     print(json.dumps(listing, indent=1) if options.json else tables.claims(listing))
     return 0
+
+
+def _keep(options: argparse.Namespace, project: Project) -> int:
+    for line in kept.keep(options.out, registry.load(project.modules), project.paper):
+        print(line)
+    return 0
+
+
+def _audit(options: argparse.Namespace, project: Project) -> int:
+    entries, rows = registry.load(project.modules), ledger.load(project.ledger)
+    problems = list(audit.problems(project, rows, entries, options.out))
+    print("\n".join([*problems, f"{len(problems)} problems" if problems else "nothing to mend"]))
+    for line in audit.remarks(project, entries):
+        print(line)
+    return int(bool(problems))
 
 
 def _refuse(problems: Sequence[str]) -> None:

@@ -17,11 +17,23 @@ STREAM = 0x5EED  # fixed stream of the bootstrap: the same errors always give th
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a criterion found: a measured number or short text, the rule in words, and whether it passed."""
+    """What a criterion found: a measured number or short text, the rule in words, and whether it passed.
+
+    `passed` is None for what is reported without a rule.
+    """
 
     measured: float | str
     criterion: str
-    passed: bool
+    passed: bool | None
+
+
+class Void(ValueError):
+    """A comparison of a thing with itself: its two arms are the same to the last bit, so that nothing is compared."""
+
+
+def reported(measured: float | str) -> Outcome:
+    """A number or short text that belongs beside a claim and has no criterion of its own."""
+    return Outcome(measured, "reported", None)
 
 
 def within(value: ArrayLike, target: float, tol: float) -> Outcome:
@@ -155,10 +167,18 @@ def ratio_within(errors: ArrayLike, others: ArrayLike, low: float, high: float) 
 
 
 def ratio_interval(errors: ArrayLike, others: ArrayLike) -> tuple[float, float, str]:
-    """(low, high, text) of mean(errors) / mean(others), bootstrapped over paired replicates (R,), R >= 8."""
+    """(low, high, text) of mean(errors) / mean(others), bootstrapped over paired replicates (R,), R >= 8.
+
+    Raises Void for arms that are bitwise equal, ValueError for unequal or too few replicates.
+    """
     a, b = np.asarray(errors, dtype=float), np.asarray(others, dtype=float)
     if a.shape != b.shape or a.ndim != 1 or a.size < 8:
         raise ValueError(f"a ratio needs at least 8 paired replicates, got shapes {a.shape} and {b.shape}")
+    if np.array_equal(a, b):
+        raise Void(
+            f"both arms of a ratio are the same {a.size} numbers, {show(float(a[0]))}, ...: they compare a thing with "
+            "itself. Choose a scene in which the arms differ, or leave the comparison out."
+        )
     chosen = np.random.default_rng(STREAM).integers(a.size, size=(BOOTSTRAP, a.size))
     with np.errstate(divide="ignore", invalid="ignore"):
         low, high = np.quantile(a[chosen].mean(axis=1) / b[chosen].mean(axis=1), [0.025, 0.975])
@@ -169,7 +189,7 @@ def ratio_interval(errors: ArrayLike, others: ArrayLike) -> tuple[float, float, 
 def all_of(*outcomes: Outcome) -> Outcome:
     """Every one of the outcomes passes (use it for a counter-criterion with several conditions)."""
     measured = "; ".join(show(o.measured) for o in outcomes)
-    return Outcome(measured, "; ".join(o.criterion for o in outcomes), all(o.passed for o in outcomes))
+    return Outcome(measured, "; ".join(o.criterion for o in outcomes), all(bool(o.passed) for o in outcomes))
 
 
 def show(measured: float | str) -> str:

@@ -3,10 +3,13 @@
 import traceback
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from figures import disk, record, store, style
-from figures.figure import Arrays, Claim, undeclared, verdict_line
+from figures.criteria import Void
+from figures.figure import Arrays, Claim, conditions_of, undeclared, verdict_line
 from figures.ledger import Row
-from figures.plan import Plan, arrays_path, key, read_chunks
+from figures.plan import Plan, arms, arrays_path, key, read_chunks
 from figures.record import Record
 
 
@@ -14,6 +17,7 @@ def finish(plan: Plan, ledger: Mapping[str, Row]) -> Record:
     """Make the figure from its chunks; an exception of its own functions becomes a crashed record."""
     chunks = read_chunks(plan)
     try:
+        refuse_void(plan, chunks)
         arrays = store.plain(plan.figure.combine(plan.data, chunks))
         claims = judged(plan, arrays)
         pictures = drawn(plan, arrays, claims)
@@ -23,6 +27,23 @@ def finish(plan: Plan, ledger: Mapping[str, Row]) -> Record:
     for name, content in pictures.items():
         disk.write_bytes(plan.folder / name, content)
     return _kept(plan, record.record(plan, claims, ledger))
+
+
+def refuse_void(plan: Plan, chunks: Sequence[Arrays]) -> None:
+    """Raises Void where two arms of a comparison, given the same random numbers, found the same to the last bit."""
+    for number, mine in enumerate(chunks):
+        for other in (k for k in arms(plan, number) if k < number and same(mine, chunks[k])):
+            one, two = (store.canonical(plan.parts[k]) for k in (other, number))
+            raise Void(
+                f"{plan.figure.id}: chunks {one} and {two} are bitwise equal on common random numbers, so that nothing "
+                "is compared. Choose a scene or a view in which they differ, or leave the comparison out."
+            )
+
+
+def same(one: Arrays, other: Arrays) -> bool:
+    """Whether all that both found, single numbers such as costs aside, is bitwise equal."""
+    names = [name for name in one.keys() & other.keys() if one[name].size > 1]
+    return bool(names) and all(np.array_equal(one[name], other[name]) for name in names)
 
 
 def crash(plan: Plan, ledger: Mapping[str, Row], trouble: str) -> Record:
@@ -46,7 +67,7 @@ def judged(plan: Plan, arrays: Arrays) -> Sequence[Claim]:
 
 def drawn(plan: Plan, arrays: Arrays, claims: Sequence[Claim]) -> dict[str, bytes]:
     """The picture as PNG and PDF, each with the verdicts at its foot."""
-    lines = [verdict_line(claim) for claim in claims]
+    lines = [verdict_line(claim, conditions_of(plan.figure, claim.id)) for claim in claims]
     with style.context():
         picture = plan.figure.draw(arrays)
         return {f"figure.{kind}": style.render(picture, lines, kind) for kind in style.METADATA}

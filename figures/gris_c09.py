@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.flatland import COLUMNS, HYBRID, means, view
 from figures.references import reference
 from restir_ref.batch import Array
@@ -112,6 +112,14 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS 6.5, 8.3; Eq. 40]",
     claims=("GRIS-C09", "GRIS-A06"),
+    conditions=(
+        Conditions(
+            ("GRIS-C09", "GRIS-A06"),
+            "6.5; 8.3",
+            Setup("offline", "still", "all", "no view: offline rendering in general"),
+            Setup("offline", "still", "all", "the insets of the rough and the glossy Cornell box, hybrid shift"),
+        ),
+    ),
     presets={"quick": {"blocks": 2, "count": 512}, "paper": {"blocks": 8, "count": 2048}},
     chunks=chunks,
     compute=compute,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, offline, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.flatland import offline as one_frame
 from figures.references import reference
 from flatland2d import SCENES
@@ -121,6 +121,15 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS 7.5]",
     claims=("GRIS-C10",),
+    conditions=(
+        Conditions(
+            ("GRIS-C10",),
+            "[GRIS 7.5]",
+            Setup("real time", "moving", "indirect", "creases"),
+            Setup("offline", "still", "all", "beside furniture"),
+            "being moved",
+        ),
+    ),
     presets={"quick": {"count": 256}, "paper": {"count": 4096}},
     chunks=chunks,
     compute=compute,

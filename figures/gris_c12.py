@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, offline, realtime, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.flatland import RULES, view
 from figures.references import reference
 from restir_ref.batch import Array
@@ -179,6 +179,15 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS 9.3]",
     claims=("GRIS-C12",),
+    conditions=(
+        Conditions(
+            ("GRIS-C12",),
+            "[GRIS 9.3]",
+            Setup("real time", "moving", "indirect", "a"),
+            Setup("real time", "still", "all", "b"),
+            "being moved",
+        ),
+    ),
     presets={
         "quick": {"real time": 64, "offline": 64, "one shift": 64},
         "paper": {"real time": 256, "offline": 512, "one shift": 256},

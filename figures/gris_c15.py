@@ -89,29 +89,28 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
 
 
 def check(a: Arrays) -> list[Claim]:
-    """Unbiased always; the variance bound, with each shift counted fully and with the confidence shared."""
-    shared, full = a["over"]
-    exceeds = ", ".join(
-        f"{fraction:.0%} ({mis})" for mis, fraction in zip(ROBUST, (full > 1 + 1e-9).mean(axis=-1), strict=True)
-    )
-    why = (
-        "Both shifts together are unbiased, which is all the paper says; the variance clause is the ledger's. Counted "
-        f"fully, one sample weighs as two, and the variance exceeds that of the worse shift in {exceeds} of the scenes"
-    )
-    parts = [("counted fully", mis, full[ROBUST.index(mis)]) for mis in ROBUST]
-    parts += [("confidence shared", mis, shared[ROBUST.index(mis)]) for mis in LINEAR]
+    """Unbiased always, which is the claim; beside it the variance, which it does not speak of."""
     return [
         Claim("GRIS-C15", criteria.below(a["bias"], 1e-10), "largest exact bias of a cell"),
-        *(
-            Claim(
-                "GRIS-C15",
-                criteria.between(over.max(), 0, 1 + 1e-9),
-                f"{mis}, {way}: largest variance over the larger single-shift one",
-                reason=why,
-            )
-            for way, mis, over in parts
-        ),
+        Claim("GRIS-C15", criteria.reported(spread(a)), "Var[sum w] over the larger single-shift one", reason=WHY),
     ]
+
+
+WHY = (
+    "The paper claims that both shifts may be combined, not that it always pays. If they share the sample's "
+    "confidence, pairwise weights average both sums, and the variance is at most the larger one. Counted fully, one "
+    "sample weighs as two, and its noise can exceed that of the worse shift."
+)
+
+
+def spread(a: Arrays) -> str:
+    """Largest variance ratios and how often they exceed 1, in words."""
+    ways = zip(("confidence shared", "counted fully"), a["over"], strict=True)
+    return "; ".join(f"{way}: " + ", ".join(map(_largest, ROBUST, over)) for way, over in ways)
+
+
+def _largest(mis: str, over: Array) -> str:
+    return f"{mis} at most {over.max():.3g} and above 1 in {(over > 1 + 1e-9).mean():.0%} of the scenes"
 
 
 def draw(a: Arrays) -> "Picture":

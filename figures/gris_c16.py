@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, realtime, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.references import reference
 from restir_ref.metrics import neighbour_correlation
 
@@ -103,6 +103,15 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS 10.1]",
     claims=("GRIS-C16",),
+    conditions=(
+        Conditions(
+            ("GRIS-C16",),
+            "[GRIS 10.1]",
+            Setup("real time", "still", "indirect", "a"),
+            Setup("real time", "still", "all", "b"),
+            "being moved",
+        ),
+    ),
     presets={"quick": {"replicas": 64, "trees": 1280}, "paper": {"replicas": 256, "trees": 5120}},
     chunks=chunks,
     compute=compute,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, realtime, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.references import reference
 from restir_ref.batch import Array
 from restir_ref.metrics import mape
@@ -151,6 +151,15 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS Fig. 1; 8.3, 9.3]",
     claims=("GRIS-F01",),
+    conditions=(
+        Conditions(
+            ("GRIS-F01",),
+            "[GRIS Fig. 1]",
+            Setup("real time", "moving", "direct by ReSTIR DI", "a"),
+            Setup("real time", "moving", "all", "b"),
+            "being moved",
+        ),
+    ),
     presets={"quick": {"replicas": 32, "trees": 384}, "paper": {"replicas": 128, "trees": 1536}},
     chunks=chunks,
     compute=compute,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.flatland import HYBRID
 from flatland2d.scenes import Setting, chain, matte
 from flatland2d.shift_pictures import pair, pair_in_words, shift_picture
@@ -154,6 +154,14 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS Fig. 5; 7.4]",
     claims=("GRIS-F05",),
+    conditions=(
+        Conditions(
+            ("GRIS-F05",),
+            "Fig. 5; 7.4",
+            Setup("candidates only", "still", "all", "one path over two glossy and two rough vertices"),
+            Setup("candidates only", "still", "all", "such a path in a corridor, and random paths there"),
+        ),
+    ),
     presets={"quick": {"paths": 2000}, "paper": {"paths": 100_000}},
     chunks=chunks,
     compute=compute,

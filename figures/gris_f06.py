@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, realtime, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.references import reference
 from flatland2d import SCENES
 from restir_ref.batch import Array
@@ -149,6 +149,15 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS Fig. 6c; 7.5, 9.2]",
     claims=("GRIS-F06",),
+    conditions=(
+        Conditions(
+            ("GRIS-F06",),
+            "[GRIS Fig. 6]",
+            Setup("real time", "still", "indirect", "a"),
+            Setup("real time", "still", "all", "b"),
+            "being moved",
+        ),
+    ),
     presets={"quick": {"replicas": 80}, "paper": {"replicas": 512}},
     chunks=chunks,
     compute=compute,

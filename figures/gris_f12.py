@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, offline, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.flatland import HYBRID, view
 from figures.flatland import offline as one_frame
 from restir_ref.batch import Array
@@ -132,6 +132,15 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS Fig. 12; 7.5, 7.6]",
     claims=("GRIS-F12",),
+    conditions=(
+        Conditions(
+            ("GRIS-F12",),
+            "[GRIS Fig. 12]",
+            Setup("real time", "moving", "direct by ReSTIR DI", "a"),
+            Setup("offline", "still", "all", "b"),
+            "being moved",
+        ),
+    ),
     presets={"quick": {"count": 256, "replicas": 64}, "paper": {"count": 4096, "replicas": 512}},
     chunks=chunks,
     compute=compute,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, offline, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from restir_ref.batch import Array
 from restir_ref.metrics import SMALL
 
@@ -91,6 +91,22 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS Fig. 13; 9.2]",
     claims=("GRIS-F13t", "GRIS-F13b"),
+    conditions=(
+        Conditions(
+            ("GRIS-F13t",),
+            "[GRIS Fig. 13]",
+            Setup("real time", "moving", "direct by ReSTIR DI", "a"),
+            Setup("offline", "still", "all", "b"),
+            "being moved",
+        ),
+        Conditions(
+            ("GRIS-F13b",),
+            "[GRIS Fig. 13]",
+            Setup("real time", "moving", "indirect", "a"),
+            Setup("offline", "still", "all", "b"),
+            "being moved",
+        ),
+    ),
     presets={
         "quick": {"path tracing": 2048, "reconnection": 128, "hybrid": 128},
         "paper": {"path tracing": 32768, "reconnection": 2048, "hybrid": 2048},

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, offline, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from restir_ref.batch import Array
 from restir_ref.metrics import correlation, mape, tile_contrast
 from restir_ref.transport.path_reuse import TILE
@@ -139,6 +139,21 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS Fig. 14; 9.3]",
     claims=("GRIS-F14", "COM-B02"),
+    conditions=(
+        Conditions(
+            ("GRIS-F14",),
+            "Fig. 14; 9.3",
+            Setup("real time", "moving", "direct by ReSTIR DI", "Kitchen, equal time"),
+            Setup("real time", "moving", "direct by ReSTIR DI", "the inset of FS3, equal rays"),
+        ),
+        Conditions(
+            ("COM-B02",),
+            "9.3",
+            Setup("one pass", "still", "all", "tiles of 16 pixels"),
+            Setup("one pass", "still", "all", "the insets of FS3 and FS1, tiles of 16 pixels"),
+        ),
+    ),
+    arm="method",
     presets={
         "quick": {"path tracing": 2048, "path reuse": 3328, "reconnection": 256, "box": 256, "eps": 0.01},
         "paper": {"path tracing": 16384, "path reuse": 16384, "reconnection": 2048, "box": 1024, "eps": EPS},

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, realtime, split_light, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.flatland import TEN
 from figures.references import reference
 from restir_ref.metrics import mape
@@ -104,6 +104,15 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS Fig. 15; 9.3]",
     claims=("GRIS-F15",),
+    conditions=(
+        Conditions(
+            ("GRIS-F15",),
+            "[GRIS Fig. 15]",
+            Setup("real time", "moving", "direct by ReSTIR DI", "a"),
+            Setup("real time", "moving", "direct by ReSTIR DI", "b"),
+            "",
+        ),
+    ),
     presets={
         "quick": {"direct": 32, "indirect": 32, "trees": 384},
         "paper": {"direct": 128, "indirect": 128, "trees": 1536},

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from figures import criteria, style
-from figures.figure import Arrays, Claim, Figure
+from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.flatland import means, samples_of_equal_cost, view
 from figures.references import reference
 from flatland2d import SCENES
@@ -197,6 +197,25 @@ FIGURE = Figure(
     world="flatland2d",
     source="[GRIS Fig. 15; 9.3]",
     claims=("GRIS-F15di", "COM-B04", "COM-B08"),
+    conditions=(
+        Conditions(
+            ("GRIS-F15di",),
+            "[GRIS Fig. 15]",
+            Setup("real time", "moving", "direct by ReSTIR DI", "a"),
+            Setup("real time", "still", "direct by ReSTIR DI", "b"),
+            "being moved",
+        ),
+        Conditions(
+            (
+                "COM-B04",
+                "COM-B08",
+            ),
+            "[GRIS 9.3]",
+            Setup("real time", "still", "direct by ReSTIR DI", "b"),
+            Setup("real time", "still", "direct by ReSTIR DI", "b"),
+            "",
+        ),
+    ),
     presets={
         "quick": {"groups": 12, "replicas": 32, "frames": 8},
         "paper": {"groups": 64, "replicas": 32, "frames": 12},

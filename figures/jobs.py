@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Job:
-    """Chunk `number` of the figure in `module`: its parameters and the root seed of its stream."""
+    """Chunk `number` of the figure in `module`: its parameters, and the root seed and number of its stream."""
 
     module: str
     figure: str
@@ -39,6 +39,7 @@ class Job:
     number: int
     chunk: Data
     seed: int
+    stream: int
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Result:
 
 
 def stream(seed: int, figure: str, number: int) -> np.random.Generator:
-    """The chunk's own random stream, a function of (root seed, figure id, chunk number) alone."""
+    """A random stream, a function of (root seed, figure id, number) alone."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(crc32(figure.encode()), number)))
 
 
@@ -61,7 +62,7 @@ def run(job: Job) -> Result:
     start = time.perf_counter()
     try:
         compute = importlib.import_module(job.module).FIGURE.compute
-        arrays = plain(compute(job.preset, job.chunk, rng=stream(job.seed, job.figure, job.number)))
+        arrays = plain(compute(job.preset, job.chunk, rng=stream(job.seed, job.figure, job.stream)))
     except Exception:
         return Result(job, {}, time.perf_counter() - start, traceback.format_exc())
     return Result(job, arrays, time.perf_counter() - start)

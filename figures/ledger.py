@@ -12,11 +12,15 @@ from figures.registry import Entry
 
 FORMAT = 1
 TEXTS = ("id", "paper", "class", "source", "sentence", "criterion")
+LISTS = ("worlds", "scenes")
 
 
 @dataclass(frozen=True)
 class Row:
-    """One claim: where it stands, what it says, how it is judged, and the verdict expected per preset."""
+    """One claim: where it stands, what it says, how it is judged, in which worlds and scenes, and what is expected.
+
+    `expected` holds a verdict per preset.
+    """
 
     id: str
     paper: str
@@ -24,6 +28,8 @@ class Row:
     source: str
     sentence: str
     criterion: str
+    worlds: tuple[str, ...]
+    scenes: tuple[str, ...]
     expected: Mapping[str, Verdict | None]
 
 
@@ -49,6 +55,8 @@ def load(path: Path) -> dict[str, Row]:
 def _row(claim: Any, where: str) -> Row:
     if not isinstance(claim, dict) or not all(isinstance(claim.get(name), str) for name in TEXTS):
         raise FigureError(f"{where}: needs the texts {', '.join(TEXTS)}")
+    if not all(_is_texts(claim.get(name, [])) for name in LISTS):
+        raise FigureError(f"{where} ({claim['id']}): needs lists of texts, {' and '.join(LISTS)}")
     expected = claim.get("expected")
     if not isinstance(expected, dict) or set(expected) != set(PRESETS):
         raise FigureError(f"{where} ({claim['id']}): expected needs {' and '.join(PRESETS)}")
@@ -56,7 +64,12 @@ def _row(claim: Any, where: str) -> Row:
         if verdict is not None and verdict not in VERDICTS:
             raise FigureError(f"{where} ({claim['id']}): {verdict!r} is none of {', '.join(VERDICTS)}")
     id_, paper, kind, source, sentence, criterion = (claim[name] for name in TEXTS)
-    return Row(id_, paper, kind, source, sentence, criterion, expected)
+    worlds, scenes = (tuple(claim.get(name, ())) for name in LISTS)
+    return Row(id_, paper, kind, source, sentence, criterion, worlds, scenes, expected)
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(each, str) for each in value)
 
 
 def unknown(rows: Mapping[str, Row], entries: Iterable[Entry]) -> Iterator[str]:

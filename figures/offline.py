@@ -1,11 +1,12 @@
-"""Offline renderers in flatland, frame by independent frame, at equal samples, rays and time.
+"""Offline renderers of indirect light in flatland, frame by independent frame, at equal samples, rays and time.
 
-Path tracing is stored in units of UNIT trees: as many make an image as its price allows.
+Direct light is out of the picture.  [GRIS 9.1, 9.3]  Path tracing is stored in units of UNIT trees: as many make an
+image as its price allows.
 """
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -13,17 +14,25 @@ import numpy as np
 
 from figures.figure import Arrays
 from figures.flatland import HYBRID, Renderer, estimates, means, offline, path_tracing, view
-from figures.references import reference
+from figures.indirect import IndirectReconnection, darkened
+from figures.references import INDIRECT, reference
+from figures.split_light import IndirectIntegrals
 from flatland2d.sensors import Pinhole
-from restir_ref.batch import Array
+from restir_ref.batch import Array, total
 from restir_ref.chance import Chance, Live
+from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import OFFLINE
-from restir_ref.transport.path_reuse import path_reuse
-from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
-from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
+from restir_ref.restir import reuse_all
+from restir_ref.transport.path_reuse import TILE, TileIntegrals, not_shared, rest_of_tile
+from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer, trace
+from restir_ref.transport.restir_di import indirect_light
+from restir_ref.transport.restir_pt import PathIntegrals
 
 UNIT = 4
 """Path trees in one stored image of path tracing."""
+
+LIT = 64
+"""Images from which rays towards lights are counted."""
 
 TREES_IN_A_FRAMES_TIME = 72
 """Path trees that take as long as one offline frame per pixel: median over scenes of `make bench`, CPU time."""
@@ -31,24 +40,30 @@ TREES_IN_A_FRAMES_TIME = 72
 
 @dataclass(frozen=True)
 class Method:
-    """A renderer and the integrals it renders."""
+    """A renderer, the integrals it renders, and how many path trees it begins per pixel."""
 
     render: Renderer
+    trees: int
     rule: Connectability = RECONNECTION
     integrals: Callable[[Tracer], PathIntegrals] = PathIntegrals
 
 
 def reused(of: PathIntegrals, index: Array, chance: Chance) -> Array:
-    """One tree per pixel, reused by its tile."""
-    return np.asarray(path_reuse(of.tracer, index % of.n, chance).mean(axis=0))
+    """One tree per pixel, reused by its tile, without direct light: `path_reuse` of darkened trees."""
+    t = of.tracer
+    tree = darkened(trace(t, chance.uniform((t.D, len(index))), index % of.n))
+    here = Pixels(TileIntegrals(t, tree), np.arange(len(index)))
+    kept = [Reservoirs(x, W, np.ones(len(W))) for x, W in here.of.candidates(here.index, chance)]
+    images = [not_shared(tree), *(reuse_all(X, here, rest_of_tile(here, TILE)) for X in kept)]
+    return np.asarray(total(images).mean(axis=0))
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
-        "path tracing": Method(path_tracing(UNIT)),
-        "path reuse": Method(reused),
-        "reconnection": Method(offline, RECONNECTION, ReconnectionAtX2),
-        "hybrid": Method(offline, HYBRID),
+        "path tracing": Method(path_tracing(UNIT, indirect_light), UNIT),
+        "path reuse": Method(reused, 1),
+        "reconnection": Method(offline, OFFLINE.trees, RECONNECTION, IndirectReconnection),
+        "hybrid": Method(offline, OFFLINE.trees, HYBRID, IndirectIntegrals),
     }
 )
 
@@ -64,11 +79,21 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
 
 
 def render(method: Method, scene: str, count: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
-    """Independent images (count, n) of the scene's inset, or of another sensor, and rays per pixel of one."""
-    asked = Counter[str]()
+    """Independent images (count, n) of the scene's inset, or of another sensor, and rays per pixel of one.
+
+    Rays towards lights from x_1 are not charged: their leaves are black.
+    """
+    asked, chance = Counter[str](), Live(rng)
     of = view(scene, method.rule, asked, sensor, method.integrals)
-    found = estimates(method.render, of, asked, count, Live(rng))
-    return {"images": found.images, "rays": np.array(found.rays)}
+    spared = method.trees * lit(of.tracer, asked, chance)
+    found = estimates(method.render, of, asked, count, chance)
+    return {"images": found.images, "rays": np.array(found.rays - spared)}
+
+
+def lit(t: Tracer, asked: Counter[str], chance: Chance) -> float:
+    """Rays towards lights from x_1 per path tree, counted; a tree of one scattering event has two other rays."""
+    shallow = PathIntegrals(replace(t, depth=1))
+    return estimates(path_tracing(1), shallow, asked, max(1, LIT * 128 // shallow.n), chance).rays - 2
 
 
 def combine(scenes: Sequence[str], methods: Sequence[str], results: Sequence[Arrays]) -> Arrays:
@@ -83,7 +108,9 @@ def combine_chunks(done: Sequence[Mapping[str, str]], results: Sequence[Arrays])
         for chunk, part in zip(done, results, strict=True)
         for key in part
     }
-    return arrays | {f"{scene}.reference": reference(scene).mean for scene in {chunk["scene"] for chunk in done}}
+    return arrays | {
+        f"{scene}.reference": reference(scene, INDIRECT).mean for scene in {chunk["scene"] for chunk in done}
+    }
 
 
 def after(a: Arrays, scene: str, method: str, T: int) -> Array:
@@ -94,9 +121,6 @@ def after(a: Arrays, scene: str, method: str, T: int) -> Array:
 def traced(a: Arrays, scene: str, trees: float) -> Array:
     """Path tracing with at least so many trees, (groups, n)."""
     return means(a[f"{scene}.path tracing.images"], int(np.ceil(trees / UNIT)))
-
-
-DIRECT = "The paper renders indirect light only; here direct light is part of the image."
 
 
 def equal_samples(T: int) -> float:

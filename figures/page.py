@@ -3,35 +3,46 @@
 import base64
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from figures.criteria import show
-from figures.figure import Verdict
+from figures.figure import Verdict, words
 from figures.gather import Shown
 from figures.ledger import Row
 from figures.record import Check, Record
 from figures.verdicts import Judged
 
 SYMBOLS: dict[Verdict, str] = {
+    "reported": "i",
     "reproduced": "✓",
     "reproduced with caveat": "≈",
+    "not judged": "…",
     "not reproduced": "○",
     "refuted": "✗",
 }
 STYLE = Path(__file__).with_name("page.css")
 COLUMNS = ("Claim", "Sentence", "Measured", "Criterion", "Verdict", "Expected")
+SETUP = {"loop": "Loop", "camera": "Camera", "light": "Light", "view": "View"}
 
 
-def page(
-    shown: Sequence[Shown], judged: Sequence[Judged], ledger: Mapping[str, Row], manifest: Mapping[str, Any]
-) -> str:
+@dataclass(frozen=True)
+class Beside:
+    """What a page shows beside results: the ledger, the kept verdicts of the paper preset, and what does not fit."""
+
+    ledger: Mapping[str, Row]
+    paper: Mapping[str, Verdict]
+    misfits: Sequence[str] = ()
+
+
+def page(shown: Sequence[Shown], judged: Sequence[Judged], beside: Beside, manifest: Mapping[str, Any]) -> str:
     """The whole page: how the run went, the table of claims, then each figure beside its claims, by paper."""
     body = [
         "<h1>Figures and claims</h1>",
-        *_summary(shown, judged),
-        *_table(judged, ledger),
+        *_summary(shown, judged, beside.misfits),
+        *_table(judged, beside),
         *(part for figure in sorted(shown, key=lambda f: (paper(f.id), f.id)) for part in _figure(figure)),
         *_provenance(manifest),
     ]
@@ -50,14 +61,14 @@ def paper(id_: str) -> str:
     return id_.partition("-")[0]
 
 
-def badge(verdict: Verdict | None) -> str:
-    """A verdict by symbol and word; colour only repeats it."""
+def badge(verdict: Verdict | None, where: str = "", preset: str = "") -> str:
+    """A verdict by symbol and word, colour only repeats it; what is refuted or not judged says where."""
     if verdict is None:
         return '<span class="badge none">– not measured</span>'
-    return f'<span class="badge {verdict.replace(" ", "-")}">{SYMBOLS[verdict]} {verdict}</span>'
+    return f'<span class="badge {verdict.replace(" ", "-")}">{SYMBOLS[verdict]} {words(verdict, where, preset)}</span>'
 
 
-def _summary(shown: Sequence[Shown], judged: Sequence[Judged]) -> Iterator[str]:
+def _summary(shown: Sequence[Shown], judged: Sequence[Judged], misfits: Sequence[str]) -> Iterator[str]:
     crashed = sum(f.record is not None and f.record.status == "crashed" for f in shown)
     unsound = sum(bool(f.troubles) for f in shown)
     differing = [row.id for row in judged if row.agrees is False]
@@ -65,9 +76,10 @@ def _summary(shown: Sequence[Shown], judged: Sequence[Judged]) -> Iterator[str]:
     yield f"<p>{len(judged)} claims, {len(shown)} figures, {troubled}.</p>"
     if differing:
         yield f'<p class="differs">Not as expected: {escape(", ".join(differing))}.</p>'
+    yield from (f'<p class="differs">{escape(misfit)}</p>' for misfit in misfits)
 
 
-def _table(judged: Sequence[Judged], ledger: Mapping[str, Row]) -> Iterator[str]:
+def _table(judged: Sequence[Judged], beside: Beside) -> Iterator[str]:
     yield '<div class="wide"><table>'
     yield "<caption>Every claim, with what was measured and the rule it was judged by</caption>"
     heads = "".join(f'<th scope="col">{name}</th>' for name in COLUMNS)
@@ -75,34 +87,38 @@ def _table(judged: Sequence[Judged], ledger: Mapping[str, Row]) -> Iterator[str]
     for name in dict.fromkeys(sorted(paper(row.id) for row in judged)):
         yield f'<tbody><tr><th colspan="{len(COLUMNS)}" scope="rowgroup">{escape(name)}</th></tr>'
         for row in (row for row in judged if paper(row.id) == name):
-            yield from _claim_rows(row, ledger.get(row.id))
+            yield from _claim_rows(row, beside)
         yield "</tbody>"
     yield "</table></div>"
 
 
-def _claim_rows(row: Judged, entry: Row | None) -> Iterator[str]:
+def _claim_rows(row: Judged, beside: Beside) -> Iterator[str]:
     """A claim's rows, one per check; the claim itself and what is expected of it span them."""
+    entry = beside.ledger.get(row.id)
     span = f' rowspan="{max(1, len(row.checks))}"'
     links = " ".join(f'<a href="#{escape(id_)}">{escape(id_)}</a>' for id_ in row.figures)
+    verdict = badge(row.verdict, row.where, row.preset)
     first = (
-        f'<th scope="row"{span}>{escape(row.id)}<br>{badge(row.verdict)}<br><small>{links}</small></th>'
+        f'<th scope="row"{span}>{escape(row.id)}<br>{verdict}<br><small>{links}</small></th>'
         f"<td{span}>{escape(entry.sentence if entry else '')}</td>"
     )
-    cells = [_check_cells(check) for _, check in row.checks] or [f"<td></td><td></td><td>{badge(None)}</td>"]
-    last = f"<td{span}>{_expectation(row)}</td>"
+    cells = [_check_cells(check, row) for _, check in row.checks] or [f"<td></td><td></td><td>{badge(None)}</td>"]
+    last = f"<td{span}>{_expectation(row, beside.paper.get(row.id))}</td>"
     yield f"<tr>{first}{cells[0]}{last}</tr>"
     yield from (f"<tr>{cell}</tr>" for cell in cells[1:])
 
 
-def _check_cells(check: Check) -> str:
+def _check_cells(check: Check, row: Judged) -> str:
     part = f"<b>{escape(check.part)}</b> " if check.part else ""
-    measured, rule = escape(show(check.measured)), escape(check.criterion)
-    return f"<td>{part}{measured}</td><td>{rule}</td><td>{badge(check.verdict)}</td>"
+    measured, rule = escape(show(check.measured) or check.reason), escape(check.criterion)
+    return f"<td>{part}{measured}</td><td>{rule}</td><td>{badge(check.verdict, row.where, row.preset)}</td>"
 
 
-def _expectation(row: Judged) -> str:
+def _expectation(row: Judged, paper: Verdict | None) -> str:
     expected = escape(row.expected) if row.expected else "nothing yet"
     notes = [f"<small>{escape(row.preset)}</small>"]
+    if paper:
+        notes.append(f"<small>kept paper run: {escape(paper)}</small>")
     if row.agrees is False:
         notes.append('<strong class="differs">differs</strong>')
     if not row.complete:
@@ -132,19 +148,37 @@ def _pictured(shown: Shown, record: Record) -> Iterator[str]:
         yield f'<img alt="{escape(_alt(record))}" src="data:image/png;base64,{data}">'
     files = [f'<a href="{escape(shown.id)}/{name}">{name}</a>' for name in ("figure.pdf", "arrays.npz")]
     yield f"<figcaption>{' · '.join(files)}</figcaption></figure>\n<ul>"
-    yield from (_item(check) for check in record.checks)
+    yield from (_item(check, record) for check in record.checks)
     yield "</ul></div>"
+    if record.conditions:
+        yield from _conditions(record)
+
+
+def _conditions(record: Record) -> Iterator[str]:
+    """Under which conditions the paper shows its claims, and under which they are judged here."""
+    yield '<div class="wide"><table><caption>Conditions, by the paper and here</caption>'
+    heads = "".join(f'<th scope="col">{name}</th>' for name in ("Claims", "Where", *SETUP.values(), "Why not the same"))
+    yield f"<thead><tr>{heads}</tr></thead><tbody>"
+    for each in record.conditions:
+        ours, why = [str(each["ours"][name]) for name in SETUP], str(each["why"])
+        first = f'<th scope="row" rowspan="2">{escape(", ".join(each["claims"]))}</th><td>{escape(each["source"])}</td>'
+        theirs = "".join(f"<td>{escape(str(each['paper'][name]))}</td>" for name in SETUP)
+        yield f'<tr>{first}{theirs}<td rowspan="2">{escape(why)}</td></tr>'
+        yield f"<tr><td>here</td>{''.join(f'<td>{escape(cell)}</td>' for cell in ours)}</tr>"
+    yield "</tbody></table></div>"
 
 
 def _alt(record: Record) -> str:
     return " ".join([f"{record.title}.", *(f"{c.id} {c.part} {c.verdict}." for c in record.checks)])
 
 
-def _item(check: Check) -> str:
+def _item(check: Check, record: Record) -> str:
+    rule = f"; criterion {check.criterion}" if check.verdict != "reported" else ""
+    measured = f"Measured {show(check.measured)}{rule}." if check.verdict != "not judged" else ""
     lines = [
-        f"{badge(check.verdict)} <b>{escape(f'{check.id} {check.part}'.strip())}</b>",
+        f"{badge(check.verdict, record.world, record.preset)} <b>{escape(f'{check.id} {check.part}'.strip())}</b>",
         escape(check.sentence),
-        f"Measured {escape(show(check.measured))}; criterion {escape(check.criterion)}.",
+        *([escape(measured)] if measured else []),
         *(f"{name}: {escape(text)}" for name, text in _remarks(check) if text),
     ]
     return f"<li>{'<br>'.join(lines)}</li>"

@@ -54,7 +54,22 @@ def _round_trip(data: Any) -> Any:
 
 def job(plan: Plan, number: int) -> Job:
     """Chunk `number` as a pure job."""
-    return Job(plan.module, plan.figure.id, plan.data, number, plan.parts[number], plan.seed)
+    return Job(plan.module, plan.figure.id, plan.data, number, plan.parts[number], plan.seed, stream(plan, number))
+
+
+def stream(plan: Plan, number: int) -> int:
+    """The number of a chunk's random stream: its own, or that of the first arm of its comparison."""
+    return min(arms(plan, number))
+
+
+def arms(plan: Plan, number: int) -> list[int]:
+    """The chunk and all that differ from it in nothing but the figure's `arm`."""
+    name, mine = plan.figure.arm, plan.parts[number]
+    if name not in mine:
+        return [number]
+    rest = {key: value for key, value in mine.items() if key != name}
+    parts = enumerate(plan.parts)
+    return [k for k, part in parts if name in part and rest == {key: part[key] for key in part if key != name}]
 
 
 def key(plan: Plan) -> str:
@@ -64,7 +79,8 @@ def key(plan: Plan) -> str:
 
 def chunk_key(plan: Plan, number: int) -> str:
     """Everything the arrays of one chunk depend on."""
-    return store.canonical({**_identity(plan), "chunk": number, "parameters": plan.parts[number]})
+    shared = {"stream": stream(plan, number)} if plan.figure.arm else {}
+    return store.canonical({**_identity(plan), "chunk": number, "parameters": plan.parts[number], **shared})
 
 
 def _identity(plan: Plan) -> dict[str, Any]:

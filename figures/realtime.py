@@ -12,7 +12,8 @@ from types import MappingProxyType
 import numpy as np
 
 from figures.figure import Arrays
-from figures.flatland import HYBRID, Traced, estimates, film, means, moving, path_tracing, samples_of_equal_cost, view
+from figures.flatland import HYBRID, Traced, estimates, film, means, path_tracing, samples_of_equal_cost, view
+from flatland2d import SCENES
 from flatland2d.motion import motion
 from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array
@@ -69,18 +70,18 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 )
 
 
-def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator) -> Arrays:
-    """The last frame of a moving camera, (replicas, n), and its rays per pixel."""
+def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
+    """The last frame of a moving camera, (replicas, n), and its rays per pixel; the scene's inset unless told."""
     asked = Counter[str]()
-    views = [method.integrals(view(scene, method.rule, asked, sensor).tracer) for sensor in widened(scene)]
+    views = [method.integrals(view(scene, method.rule, asked, each).tracer) for each in widened(scene, sensor)]
     *_, (images, cost) = costed(views, asked, replicas, Live(rng))
     return {"images": inset(images), "rays": np.array(cost)}
 
 
-def still(method: Method, scene: str, replicas: int, rng: np.random.Generator) -> Arrays:
+def still(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
     """The first frame and the last half of a still camera's, (1 + FRAMES // 2, replicas, n), and rays per pixel."""
     asked = Counter[str]()
-    of = method.integrals(view(scene, method.rule, asked).tracer)
+    of = method.integrals(view(scene, method.rule, asked, sensor).tracer)
     frames = list(costed([of] * FRAMES, asked, replicas, Live(rng)))
     kept = [frames[0], *frames[FRAMES // 2 :]]
     return {"images": np.stack([images for images, _ in kept]), "rays": np.array(frames[-1][1])}
@@ -102,10 +103,19 @@ def motion_vectors(of: Traced, before: Traced) -> Array:
     return motion(uncounted, t.sensor, before.tracer.sensor).source  # type: ignore[arg-type]
 
 
-def widened(scene: str) -> list[Pinhole]:
-    """The moving inset's sensors, MARGIN pixels wider on both sides."""
-    sensors = moving(scene, FRAMES, STEP)
-    return [replace(each, n=each.n + 2 * MARGIN, first=each.first - MARGIN) for each in sensors]
+def widened(scene: str, sensor: Pinhole | None = None) -> list[Pinhole]:
+    """The sensors of a camera that moves sideways and arrives at the inset, MARGIN pixels wider on both sides."""
+    last = sensor or SCENES[scene]().pinhole()
+    wide = replace(last, n=last.n + 2 * MARGIN, first=last.first - MARGIN)
+    forward = np.subtract(last.towards, last.eye) / np.linalg.norm(np.subtract(last.towards, last.eye))
+    side = STEP * np.array([forward[1], -forward[0]])
+    return [displaced(wide, (k - FRAMES + 1) * side) for k in range(FRAMES)]
+
+
+def displaced(sensor: Pinhole, by: Array) -> Pinhole:
+    """The sensor moved, looking in the same direction."""
+    eye, towards = np.add(sensor.eye, by), np.add(sensor.towards, by)
+    return replace(sensor, eye=(float(eye[0]), float(eye[1])), towards=(float(towards[0]), float(towards[1])))
 
 
 def inset(images: Array) -> Array:

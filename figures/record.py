@@ -4,15 +4,16 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from dataclasses import fields as dataclass_fields
 from pathlib import Path
 from typing import Any, Literal
 
 from figures import disk
-from figures.figure import VERDICTS, Claim, Verdict, verdict_of
+from figures.figure import VERDICTS, Claim, Conditions, Figure, Verdict, conditions_of, verdict_of
 from figures.ledger import Row
 from figures.plan import Plan
 
-FORMAT = 1
+FORMAT = 2
 NAME = "claims.json"
 
 Status = Literal["done", "crashed"]
@@ -20,7 +21,7 @@ Status = Literal["done", "crashed"]
 
 @dataclass(frozen=True)
 class Check:
-    """One judged claim of a figure."""
+    """One claim of a figure as it was judged; what is not judged was not measured."""
 
     id: str
     part: str
@@ -44,6 +45,7 @@ class Record:
     seed: int
     version: int
     claims: Sequence[str]
+    conditions: Sequence[Mapping[str, Any]]
     status: Status
     traceback: str
     checks: Sequence[Check]
@@ -51,17 +53,20 @@ class Record:
 
 def record(plan: Plan, claims: Sequence[Claim], ledger: Mapping[str, Row], traceback: str = "") -> Record:
     """The record of a planned figure; a traceback makes it a crashed one."""
-    figure, checks = plan.figure, tuple(_check(claim, ledger) for claim in claims)
+    figure, checks = plan.figure, tuple(_check(claim, plan.figure, ledger) for claim in claims)
     names = (figure.id, figure.title, figure.source, figure.world)
-    run = (plan.preset, plan.seed, figure.version, tuple(figure.claims))
-    return Record(*names, *run, "crashed" if traceback else "done", traceback, checks)
+    run = (plan.preset, plan.seed, figure.version, list(figure.claims))
+    conditions = [json.loads(json.dumps(asdict(each))) for each in figure.conditions]
+    return Record(*names, *run, conditions, "crashed" if traceback else "done", traceback, checks)
 
 
-def _check(claim: Claim, ledger: Mapping[str, Row]) -> Check:
+def _check(claim: Claim, figure: Figure, ledger: Mapping[str, Row]) -> Check:
     outcome, sentence = claim.outcome, claim.sentence or ledger[claim.id].sentence
-    measured = outcome.measured if isinstance(outcome.measured, str) else _number(outcome.measured)
-    texts = (claim.caveat, claim.reason)
-    return Check(claim.id, claim.part, sentence, measured, outcome.criterion, verdict_of(claim), *texts)
+    measured = outcome.measured if outcome else ""
+    value = measured if isinstance(measured, str) else _number(measured)
+    verdict = verdict_of(claim, conditions_of(figure, claim.id))
+    criterion = outcome.criterion if outcome else ""
+    return Check(claim.id, claim.part, sentence, value, criterion, verdict, claim.caveat, claim.reason)
 
 
 def _number(value: float) -> float | str:
@@ -97,4 +102,10 @@ def _sound(found: Record) -> bool:
     verdicts = all(check.verdict in VERDICTS for check in found.checks)
     numbers = all(isinstance(check.measured, (int, float, str)) for check in found.checks)
     lists = isinstance(found.claims, list) and found.status in ("done", "crashed")
+    lists = lists and isinstance(found.conditions, list) and all(map(_is_condition, found.conditions))
     return verdicts and numbers and lists and all(isinstance(text, str) for text in texts)
+
+
+def _is_condition(data: Any) -> bool:
+    fields = {field.name for field in dataclass_fields(Conditions)}
+    return isinstance(data, dict) and set(data) == fields

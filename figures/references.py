@@ -1,7 +1,7 @@
 """Reference images of the flatland scenes: long path tracing, or a closed form, stored with their standard errors.
 
-`make evidence ARGS=references` makes them.  Each carries a fingerprint of its scene, sensor and depth:
-a scene that has changed since has no reference.
+`make evidence` makes them, by its jobs `references` and `indirect references`.  Each carries a fingerprint of its
+scene, sensor and depth: a scene that has changed since has no reference.
 """
 
 import hashlib
@@ -21,7 +21,10 @@ from restir_ref.transport.lobes import KINDS
 
 PATH = Path(__file__).with_suffix(".npz")
 KEY = store.canonical({"what": "reference images of flatland", "format": 1})
-REMEDY = "run: make evidence ARGS=references"
+INDIRECT = "indirect"
+"""Light that ReSTIR DI does not stand for: all but what comes from a light by way of x_1 alone."""
+REMEDIES = {"": "run: make evidence ARGS=references", INDIRECT: "run: make evidence ARGS=\"'indirect references'\""}
+"""How to make the references of all light, and of indirect light."""
 DIGITS = 12
 """Digits that count: sines and tangents in scenes end differently on other machines."""
 
@@ -41,17 +44,27 @@ class Reference:
     how: str
 
 
-def reference(name: str, path: Path = PATH) -> Reference:
-    """The reference of one scene; raises FigureError if there is none, or if the scene is another one now."""
-    stored = stored_at(path)
-    if f"{name}.mean" not in stored:
-        raise FigureError(f"{path.name} holds no reference of the scene {name!r}; {REMEDY}")
-    if str(stored[f"{name}.scene"]) != fingerprint(SCENES[name]()):
-        raise FigureError(f"the scene {name!r} has changed since its reference was computed; {REMEDY}")
-    mean, error = stored[f"{name}.mean"], stored[f"{name}.error"]
+def reference(name: str, light: str = "", path: Path = PATH) -> Reference:
+    """The reference of one scene, of all light or of INDIRECT light alone.
+
+    Raises FigureError if there is none, or if the scene is another one now.
+    """
+    stored, key = stored_at(path), key_of(name, light)
+    if f"{key}.mean" not in stored:
+        raise FigureError(
+            f"{path.name} holds no reference of the scene {name!r}{light and f', {light}'}; {REMEDIES[light]}"
+        )
+    if str(stored[f"{key}.scene"]) != fingerprint(SCENES[name]()):
+        raise FigureError(f"the scene {name!r} has changed since its reference was computed; {REMEDIES[light]}")
+    mean, error = stored[f"{key}.mean"], stored[f"{key}.error"]
     return Reference(
-        mean, error, float(stored[f"{name}.image_error"]), int(stored[f"{name}.samples"]), str(stored[f"{name}.how"])
+        mean, error, float(stored[f"{key}.image_error"]), int(stored[f"{key}.samples"]), str(stored[f"{key}.how"])
     )
+
+
+def key_of(name: str, light: str = "") -> str:
+    """The name under which a reference is stored: the scene, and the light if it is not all."""
+    return f"{name}.{light}" if light else name
 
 
 def stored_at(path: Path) -> Arrays:
@@ -59,14 +72,14 @@ def stored_at(path: Path) -> Arrays:
     found = store.load(path, KEY)
     if found.state in ("ours", "absent"):
         return found.arrays
-    raise FigureError(f"{path.name} cannot be used ({found.trouble}); restore it from git, or {REMEDY}")
+    raise FigureError(f"{path.name} cannot be used ({found.trouble}); restore it from git, or {REMEDIES['']}")
 
 
 def save(references: Mapping[str, Reference], path: Path = PATH) -> None:
-    """Write references of today's scenes into the file, in one step; one that is better stays."""
+    """Write references of today's scenes, by `key_of`, into the file, in one step; one that is better stays."""
     arrays = stored_at(path)
     for name, each in references.items():
-        scene = fingerprint(SCENES[name]())
+        scene = fingerprint(SCENES[name.partition(".")[0]]())
         stays = str(arrays.get(f"{name}.scene")) == scene and arrays[f"{name}.image_error"] < each.image_error
         if not stays:
             values: dict[str, Any] = {**vars(each), "scene": scene}

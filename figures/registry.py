@@ -62,11 +62,13 @@ ID = re.compile(r"[A-Z][A-Z0-9]*-[A-Za-z0-9-]+")
 
 @dataclass(frozen=True)
 class Project:
-    """Where the engine finds figures, claims and tests; the commands of tests use another one."""
+    """Where the engine finds figures, claims, tests and what long runs found; the commands of tests use another one."""
 
     modules: tuple[str, ...] = MODULES
     ledger: Path = ROOT / "figures" / "ledger.json"
     tests: Path = ROOT / "tests"
+    paper: Path = ROOT / "figures" / "paper.json"
+    benchmarks: Path = ROOT / "benchmarks"
 
 
 @dataclass(frozen=True)
@@ -107,11 +109,23 @@ def faults(figure: Figure) -> Iterator[str]:
         yield f"presets are {sorted(figure.presets)}, not {sorted(PRESETS)}"
     if len(set(figure.claims)) != len(figure.claims):
         yield f"claims {figure.claims} repeat an id"
+    yield from _unexplained(figure)
     for name, data in figure.presets.items():
         try:
             canonical(data)
         except (TypeError, ValueError) as error:
             yield f"preset {name!r} is not plain JSON data ({error})"
+
+
+def _unexplained(figure: Figure) -> Iterator[str]:
+    """Claims of a figure that renders without conditions, and conditions that are not the paper's without a reason."""
+    covered = [id_ for each in figure.conditions for id_ in each.claims]
+    needed = set(figure.claims) if figure.world != "toy1d" else set(covered)
+    if len(set(covered)) != len(covered) or set(covered) != needed:
+        yield f"conditions cover {sorted(covered)}, but must cover each of {sorted(needed)} once"
+    for each in figure.conditions:
+        if not each.alike and not each.why:
+            yield f"conditions of {', '.join(each.claims)} are {each.ours.kind}, the paper's {each.paper.kind}: say why"
 
 
 def select(entries: Mapping[str, Entry], ids: Sequence[str]) -> list[Entry]:

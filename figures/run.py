@@ -6,6 +6,7 @@ Every chunk is stored once it is done: whatever ends a run early, the same comma
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from figures import jobs, outdir, plan, report, session, store
 from figures.finish import crash, finish
@@ -27,18 +28,22 @@ class Ending:
 
 
 def run(
-    request: Request, ledger: Mapping[str, Row], registry: Mapping[str, Entry], progress: Progress
+    request: Request, ledger: Mapping[str, Row], registry: Mapping[str, Entry], paper: Path, progress: Progress
 ) -> tuple[int, list[Judged]]:
-    """Run the request; return the exit status and the verdicts of everything stored in the folder."""
+    """Run the request; return the exit status and the verdicts of everything stored in the folder.
+
+    `paper` is the file of the kept runs of the paper preset, with which all is compared.
+    """
     with outdir.opened(request.out, registry, progress.say):
         mine = session.begin(request, ledger, progress.say)
         session.note(mine, "running")
         ending = _work(mine, progress)
         session.note(mine, ending.words)
-        judged = report.write(request.out, ledger, registry)
+        judged = report.write(request.out, ledger, registry, paper)
     if ending.status:
         progress.say(f"{ending.words}. {RESUME}")
-    return ending.status or _status(mine, judged), judged
+    unfit = any(report.misfits(request.out, ledger, registry, paper))
+    return ending.status or _status(mine, judged) or int(unfit), judged
 
 
 def _work(mine: Session, progress: Progress) -> Ending:

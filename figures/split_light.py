@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from figures.figure import Arrays
-from figures.flatland import HYBRID, Traced, estimates, view
+from figures.flatland import HYBRID, Traced, estimates, path_tracing, view
 from figures.realtime import Method, inset, motion_vectors, moved, widened
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
@@ -94,10 +94,5 @@ def indirect_trees(scene: str, count: int, rng: np.random.Generator) -> Arrays:
     Rays towards lights from x_1, at most one per tree, are not charged: their leaves are black.
     """
     asked = Counter[str]()
-    found = estimates(_one_tree, view(scene, HYBRID, asked), asked, count, Live(rng))
+    found = estimates(path_tracing(1, indirect_light), view(scene, HYBRID, asked), asked, count, Live(rng))
     return {"images": found.images, "rays": np.array(found.rays - 1)}
-
-
-def _one_tree(of: PathIntegrals, index: Array, chance: Chance) -> Array:
-    tree = trace(of.tracer, chance.uniform((of.tracer.D, len(index))), index % of.n)
-    return np.asarray(indirect_light(tree).mean(axis=0))

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from figures.criteria import show
-from figures.figure import VERDICTS, Verdict
+from figures.figure import VERDICTS, Verdict, words
 from figures.gather import gather
 from figures.ledger import Row
 from figures.registry import Entry
+from figures.showings import KINDS, Showing, as_data
 from figures.verdicts import Judged
 
 WIDEST = 44
@@ -45,36 +46,56 @@ def figures(rows: Sequence[Mapping[str, Any]]) -> str:
     return aligned(("figure", "world", "source", "claims", "title"), cells) if rows else "no figures yet"
 
 
-def claim_row(row: Row, tests: Sequence[str], figures: Sequence[str], verdict: Verdict | None) -> dict[str, Any]:
-    """One claim as `ledger --json` prints it."""
+def claim_row(row: Row, found: Sequence[Showing], verdict: Verdict | None, paper: Verdict | None) -> dict[str, Any]:
+    """One claim as `ledger --json` prints it; `paper` is the kept verdict of the paper preset."""
     return {
         "id": row.id,
         "class": row.kind,
-        "tests": list(tests),
-        "figures": list(figures),
+        **as_data(row, found),
+        "scenes": list(row.scenes),
         "verdict": verdict,
+        "paper": paper,
         "sentence": row.sentence,
         "criterion": row.criterion,
     }
 
 
 def claims(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The ledger as a table, and how much of it is covered."""
+    """The ledger as a table, and how much of it is covered, by world."""
+    heads = ("claim", "class", "tests", "figures", "more", "worlds", "verdict", "sentence")
     cells = [[row["id"], row["class"], *_coverage(row), row["sentence"]] for row in rows]
-    tested, drawn = (sum(bool(row[name]) for row in rows) for name in ("tests", "figures"))
-    foot = f"{len(rows)} claims: {tested} with tests, {drawn} with figures"
-    return aligned(("claim", "class", "tests", "figures", "verdict", "sentence"), cells) + "\n" + foot
+    shown = {kind: sum(bool(row[kind]) for row in rows) for kind in KINDS}
+    counts = f"{shown['tests']} with tests, {shown['figures']} with figures, {shown['evidence']} with evidence"
+    foot = [f"{len(rows)} claims: {counts}, {shown['benchmark']} with a benchmark", *_worlds(rows)]
+    return aligned(heads, cells) + "\n" + "\n".join(foot)
 
 
 def _coverage(row: Mapping[str, Any]) -> list[str]:
-    return [str(len(row["tests"])), ", ".join(row["figures"]), row["verdict"] or "-"]
+    more = [*row["evidence"], *row["benchmark"]]
+    shown = [world + " (part)" * (how == "part") for world, how in row["worlds"].items()]
+    worlds = shown + [f"no {world}" for world in row["missing"]]
+    return [
+        str(len(row["tests"])),
+        ", ".join(row["figures"]),
+        ", ".join(more),
+        ", ".join(worlds),
+        row["verdict"] or "-",
+    ]
 
 
-def summary(judged: Sequence[Judged], crashed: Sequence[str]) -> str:
-    """The verdicts after a run, the figures that crashed, and how many claims came out how."""
+def _worlds(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Per world: rows that name it, shown whole, in part, and not at all."""
+    for world in dict.fromkeys(world for row in rows for world in [*row["worlds"], *row["missing"]]):
+        how = Counter(row["worlds"].get(world, "missing") for row in rows if world in [*row["worlds"], *row["missing"]])
+        yield f"{world}: {how['whole']} shown, {how['part']} in part, {how['missing']} missing"
+
+
+def summary(judged: Sequence[Judged], crashed: Sequence[str], misfits: Sequence[str] = ()) -> str:
+    """The verdicts after a run, the figures that crashed, what does not fit, and how many claims came out how."""
     heads = ("claim", "figure", "measured", "criterion", "verdict", "what was measured")
     table = aligned(heads, [row for claim in judged for row in _rows(claim)])
-    return "\n".join([table, *(f"{id_} crashed: its traceback is in the report" for id_ in crashed), counts(judged)])
+    troubles = [*(f"{id_} crashed: its traceback is in the report" for id_ in crashed), *misfits]
+    return "\n".join([table, *troubles, counts(judged)])
 
 
 def counts(judged: Sequence[Judged]) -> str:
@@ -87,7 +108,8 @@ def counts(judged: Sequence[Judged]) -> str:
 
 def _rows(claim: Judged) -> Iterator[list[str]]:
     """The claim with its verdict and, where it is not the expected one, that; then its checks."""
-    verdict = (claim.verdict or "not measured") + (f" DIFFERS from {claim.expected}" if claim.agrees is False else "")
+    found = words(claim.verdict, claim.where, claim.preset) if claim.verdict else "not measured"
+    verdict = found + (f" DIFFERS from {claim.expected}" if claim.agrees is False else "")
     yield [claim.id, ", ".join(claim.figures), "", "", verdict, ""]
     for figure, check in claim.checks:
         yield ["", figure, show(check.measured), check.criterion, check.verdict, check.part]

@@ -22,7 +22,7 @@ class Judged:
 
     `complete` tells whether every figure that declares the claim has been run. The verdict of an incomplete
     claim may still get worse, so it agrees unless it is already worse than expected. `agrees` is None where
-    the ledger expects nothing yet or nothing was measured.
+    the ledger expects nothing yet or nothing was measured. `where` names the worlds of the checks that decided.
     """
 
     id: str
@@ -33,6 +33,7 @@ class Judged:
     agrees: bool | None
     figures: tuple[str, ...]
     checks: tuple[tuple[str, Check], ...]
+    where: str
 
 
 def judge(records: Sequence[Record], ledger: Mapping[str, Row], declared: Mapping[str, set[str]]) -> list[Judged]:
@@ -53,7 +54,9 @@ def _judged(
     complete = declared.get(id_, set()) <= done and all(record.status == "done" for record in mine)
     expected = row.expected.get(preset) if row else None
     agrees = _agrees(verdict, expected, exactly=complete)
-    return Judged(id_, preset, verdict, expected, complete, agrees, tuple(r.id for r in mine), checks)
+    deciding = [record.world for record in mine if verdict in [c.verdict for c in record.checks if c.id == id_]]
+    where = ", ".join(dict.fromkeys(deciding))
+    return Judged(id_, preset, verdict, expected, complete, agrees, tuple(r.id for r in mine), checks, where)
 
 
 def _agrees(verdict: Verdict | None, expected: Verdict | None, *, exactly: bool) -> bool | None:

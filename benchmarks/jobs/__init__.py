@@ -4,12 +4,24 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from benchmarks.jobs import baselines, extremes, means, offline, probes, references, retracing, roundtrips, tracing
+from benchmarks.jobs import (
+    baselines,
+    extremes,
+    indirect_references,
+    means,
+    offline,
+    probes,
+    references,
+    retracing,
+    roundtrips,
+    tracing,
+)
 from benchmarks.jobs.job import Done, Job
 
 JOBS: Mapping[str, Job] = MappingProxyType(
     {
         "references": references.JOB,
+        "indirect references": indirect_references.JOB,
         "round trips": roundtrips.JOB,
         "re-tracing": retracing.JOB,
         "extremes": extremes.JOB,
@@ -20,5 +32,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "probes": probes.JOB,
     }
 )
-PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType({"references": references.publish})
+PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType(
+    {"references": references.publish, "indirect references": indirect_references.publish}
+)
 """What else a job leaves behind, in the checkout at a path."""

@@ -128,12 +128,24 @@ def identity(name: str, job: Job, params: Params) -> str:
 # ---------------------------------------------------------------- code
 
 
+def depends(job: Job) -> str:
+    """A digest of all that a job's results depend on: its code, or what every chunk says that it depends on."""
+    if job.identity is None:
+        return code(job.compute.__module__)
+    said = [store.canonical({"params": dict(params), "on": job.identity(params)}) for params in job.chunks(1.0)]
+    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:16]
+
+
 @cache
 def code(module: str) -> str:
-    """SHA-256, shortened, over the syntax trees, without docstrings, of a module and all of ours that it imports."""
+    """SHA-256, shortened, over a module and all of ours that it imports: syntax trees without docstrings, and numbers.
+
+    Numbers are those in an `.npz` of the module's name, such as reference images.
+    """
     total = hashlib.sha256()
     for name in sorted(reached(module)):
         total.update(_syntax(name))
+        total.update(_numbers(name))
     return total.hexdigest()[:16]
 
 
@@ -173,3 +185,9 @@ def _syntax(module: str) -> bytes:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
             node.body = node.body[1:]
     return hashlib.sha256(ast.dump(tree).encode()).digest()
+
+
+def _numbers(module: str) -> bytes:
+    path = _file(module)
+    numbers = path.with_suffix(".npz") if path else None
+    return hashlib.sha256(numbers.read_bytes()).digest() if numbers and numbers.exists() else b""

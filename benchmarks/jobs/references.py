@@ -6,7 +6,7 @@ the mean is that of independent samples, with about a tenth of their variance; t
 comes from the spread over the moves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from figures.references import PATH, Reference, fingerprint, save
 from flatland2d.radiosity import cut, render
 from flatland2d.scenes import INSET, SCENES, Setting
 from restir_ref.batch import Array
-from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
+from restir_ref.transport.paths import RECONNECTION, Tracer, Tree, radiance, trace
 
 POINTS, GENERATOR = 1021, 76
 """Points of the lattice, a prime, and its generator."""
@@ -30,6 +30,9 @@ PANELS, FILM = (120, 240), 24
 UNRESOLVED = ("many_lights",)
 """Scenes whose segments have more edges of shadows than panels: there path tracing is the better reference."""
 LIMIT, EPS, SIGMA, SPREAD = 1e-3, 0.003, 4.0, 1.3
+Shown = Callable[[Tree], Array]
+"""Which leaves of a tree make the image, (C, N)."""
+
 TRACED = "path tracing, light and BSDF sampling combined by MIS, randomly moved lattices"
 REFINED = "radiosity with exact visibility; the error is its change when refined"
 
@@ -40,18 +43,18 @@ def lattice(D: int) -> Array:
     return np.asarray(powers[:, None] * np.arange(POINTS) % POINTS / POINTS)
 
 
-def moved(t: Tracer, pixel: Array, rng: np.random.Generator) -> Array:
+def moved(t: Tracer, pixel: Array, rng: np.random.Generator, shown: Shown = radiance) -> Array:
     """The mean radiance of each pixel (n,) over one lattice, moved at random for each; (n,)."""
     u = (lattice(t.D)[:, None] + rng.random((t.D, len(pixel), 1))) % 1
-    L = radiance(trace(t, u.reshape(t.D, -1), pixel.repeat(POINTS)))
+    L = shown(trace(t, u.reshape(t.D, -1), pixel.repeat(POINTS)))
     return np.asarray(L[0].reshape(len(pixel), POINTS).mean(axis=1))
 
 
-def image(setting: Setting, rng: np.random.Generator) -> Array:
+def image(setting: Setting, rng: np.random.Generator, shown: Shown = radiance) -> Array:
     """One image of POINTS samples per pixel, (n,)."""
     t = Tracer(setting.scene, setting.pinhole(), setting.depth, RECONNECTION)
     first = range(0, INSET, PIXELS_AT_ONCE)
-    return np.concatenate([moved(t, np.arange(at, at + PIXELS_AT_ONCE), rng) for at in first])
+    return np.concatenate([moved(t, np.arange(at, at + PIXELS_AT_ONCE), rng, shown) for at in first])
 
 
 def has_radiosity(scene: str) -> bool:
@@ -140,7 +143,12 @@ def row(scene: str, found: Reference) -> Row:
 
 
 def against(scene: str, exact: Reference, found: Reference) -> Row:
-    """Path tracing, judged by radiosity: the image, and the spread of the pixels' z-scores."""
+    """Path tracing, judged by radiosity."""
+    return compared("COM-A01, COM-B01, GRIS-E49", f"{scene}: path tracing against radiosity", exact, found)
+
+
+def compared(claims: str, what: str, exact: Reference, found: Reference) -> Row:
+    """One image judged by another: its mean, and the spread of the pixels' z-scores."""
     scale, difference = exact.mean.mean(), found.mean - exact.mean
     error = np.hypot(found.image_error, exact.image_error)
     z = difference.mean() / error
@@ -148,8 +156,7 @@ def against(scene: str, exact: Reference, found: Reference) -> Row:
     holds = abs(z) <= SIGMA and error <= EPS * scale and spread <= SPREAD
     note = f"z {z:+.2f}; z-spread of pixels {spread:.2f}"
     limit, relative = f"|z| <= {SIGMA:g}, SE <= {EPS:.1%}, spread <= {SPREAD}", difference.mean() / scale
-    what = f"{scene}: path tracing against radiosity"
-    return Row("COM-A01, COM-B01, GRIS-E49", what, relative, limit, bool(holds), found.samples, error / scale, note)
+    return Row(claims, what, relative, limit, bool(holds), found.samples, error / scale, note)
 
 
 def publish(done: Done, root: Path) -> None:

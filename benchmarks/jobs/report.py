@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from benchmarks.jobs.job import ROOT, SEED, Done, Job, Row, code
+from benchmarks.jobs.job import ROOT, SEED, Done, Job, Row, depends
 from figures import disk
 
 JSON, TABLE = "benchmarks/evidence.json", "docs/evidence.md"
@@ -21,7 +21,7 @@ MEASURED_CODE = ("restir_ref", "flatland2d", "benchmarks", "tests/transport")
 
 @dataclass(frozen=True)
 class Measured:
-    """One job's results and where they come from; `code` is the digest of all code the chunks depend on."""
+    """One job's results and where they come from; `code` is the digest of all that the chunks depend on."""
 
     asks: str
     commit: str
@@ -54,7 +54,7 @@ def measured(job: Job, of: Checkout, share: float, rows: Sequence[Row], done: Do
         job.asks,
         of.commit,
         of.changed,
-        code(job.compute.__module__),
+        depends(job),
         SEED,
         share,
         datetime.now(UTC).date().isoformat(),
@@ -82,6 +82,22 @@ def file(name: str, found: Measured, root: Path) -> None:
         each.parent.mkdir(parents=True, exist_ok=True)
     disk.write_text(path, json.dumps(everything, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     disk.write_text(root / TABLE, page(everything))
+
+
+def stale(jobs: Mapping[str, Job], root: Path) -> list[str]:
+    """Jobs whose filed results are missing, partial, or were measured by other code or against other references."""
+    path = root / JSON
+    filed = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    said = []
+    for name, job in jobs.items():
+        found = filed.get(name)
+        if found is None:
+            said.append(f"{name}: never measured")
+        elif found["share"] != 1:
+            said.append(f"{name}: measured at {found['share']:.3g} of its counts only")
+        elif found["code"] != depends(job):
+            said.append(f"{name}: code or references have changed since it was measured at {found['commit']}")
+    return said + [f"{name}: is filed, but no job any more" for name in filed if name not in jobs]
 
 
 def page(everything: Mapping[str, Any]) -> str:

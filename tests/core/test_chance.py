@@ -10,6 +10,8 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import chisquare
 
 from restir_ref.chance import Live
+from restir_ref.resampling import Candidate
+from restir_ref.streaming import select_streaming
 from tests.core.stubs import Constantly
 
 NEXT_TO_ONE = np.nextafter(1.0, 0.0)
@@ -95,13 +97,17 @@ class AgainstOldSum:
 
 
 def p_value(chance, weights) -> float:
-    """Of a chi-square test of the frequencies against weights / sum; 0 if an option of weight 0 occurs."""
-    s = chance.choose(np.broadcast_to(weights[:, None], (len(weights), DRAWS)))
+    """Of a chi-square test of choices against weights / sum."""
+    return p_of(chance.choose(np.broadcast_to(weights[:, None], (len(weights), DRAWS))), weights)
+
+
+def p_of(s, weights) -> float:
+    """Of a chi-square test of the frequencies of s against weights / sum; 0 if an option of weight 0 occurs."""
     seen = np.bincount(s, minlength=len(weights))
     possible = weights > 0
     if seen[~possible].any():
         return 0.0
-    return float(chisquare(seen[possible], DRAWS * weights[possible] / weights.sum()).pvalue)
+    return float(chisquare(seen[possible], len(s) * weights[possible] / weights.sum()).pvalue)
 
 
 ORDERS = {"given": slice(None), "reversed": slice(None, None, -1), "sorted": np.argsort(WEIGHTS)}
@@ -116,6 +122,35 @@ def test_frequencies_are_in_proportion_to_the_weights_in_any_order(order):
 @every_order
 def test_a_choice_against_the_old_sum_is_noticed(order):
     assert p_value(AgainstOldSum(np.random.default_rng(1)), WEIGHTS[order]) < 1e-4
+
+
+RUNS = 1_000_000
+
+
+def reservoirs(weights, chance):
+    """What a million streaming reservoirs hold after these weights."""
+    offered = (Candidate(np.full(RUNS, k), np.ones(RUNS), np.full(RUNS, w)) for k, w in enumerate(weights))
+    return select_streaming(offered, chance, np.ones(RUNS)).x
+
+
+@pytest.mark.claims("GRIS-A01")
+@every_order
+def test_a_million_reservoirs_hold_their_candidates_in_proportion_to_the_weights(order):
+    assert p_of(reservoirs(WEIGHTS[order], Live(np.random.default_rng(6))), WEIGHTS[order]) > 1e-4
+
+
+@pytest.mark.claims("GRIS-A01")
+@every_order
+def test_a_reservoir_always_takes_the_first_candidate_that_counts(order):
+    first = int(np.flatnonzero(WEIGHTS[order])[0])
+    assert (reservoirs(WEIGHTS[order][: first + 1], Live(np.random.default_rng(7))) == first).all()
+
+
+@pytest.mark.claims("GRIS-A01")
+@every_order
+def test_a_million_choices_against_the_old_sum_are_noticed(order):
+    weights = np.broadcast_to(WEIGHTS[order][:, None], (len(WEIGHTS), RUNS))
+    assert p_of(AgainstOldSum(np.random.default_rng(6)).choose(weights), WEIGHTS[order]) < 1e-4
 
 
 def test_columns_choose_by_their_own_weights():

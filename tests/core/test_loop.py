@@ -5,6 +5,8 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 import pytest
 
+from flatland2d import SCENES
+from flatland2d.scenes import Setting
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Reservoirs
@@ -25,7 +27,7 @@ class Row:
     n: int
 
 
-def steps(around: Around, n: int, count: int, radius: int, pixel: Array, seed: int = 1) -> Array:
+def steps(around: Around, n: int, count: int, radius: float, pixel: Array, seed: int = 1) -> Array:
     """How far the neighbours of `pixel` are away, (count, N)."""
     found = around(Row(n), pixel, count, radius, live(seed))  # type: ignore[arg-type]
     return np.stack([each.index for each in found]) - pixel
@@ -44,10 +46,44 @@ def discrepancy_of_neighbours(around: Around) -> float:
     return float(star_discrepancy(u).mean())
 
 
-@pytest.mark.claims("GRIS-A07")
+@pytest.mark.claims("GRIS-A07", part="values of the preset")
 def test_the_real_time_preset_is_the_papers():
     reuse = {"rounds": 1, "neighbours": 3, "radius": 20, "cap": 20}
     assert asdict(REAL_TIME) == {"trees": 1, **reuse, "along": "talbot", "across": "defensive"}
+
+
+def distinct(pool: float, count: int) -> float:
+    """Expected number of different neighbours among `count` that are uniform in a pool."""
+    return float(pool * (1 - (1 - 1 / pool) ** count))
+
+
+def distinct_in_row(radius: float) -> float:
+    """The same, measured: of the real-time preset's neighbours in the middle of a row, with another radius."""
+    found = np.sort(steps(random_in_row, 1920, REAL_TIME.neighbours, radius, np.full(100_000, 960)), axis=0)
+    return float(1 + (np.diff(found, axis=0) > 0).sum(axis=0).mean())
+
+
+def radius_scaled_to(setting: Setting) -> float:
+    """The real-time radius in pixels for a film of the setting's sensor, the paper's having 1920 pixels."""
+    return REAL_TIME.radius * setting.pinhole().film / 1920
+
+
+@pytest.mark.claims("GRIS-A07", part="the radius in images of one dimension", world="flatland2d")
+@pytest.mark.parametrize("scene", SCENES)
+def test_in_rows_of_pixels_the_radius_is_the_papers_share_of_the_film_and_finds_as_many_neighbours(scene):
+    """20 pixels of 1920; a row has 40 pixels that near and a disc 1256, so that 2% of the three are met twice."""
+    radius = radius_scaled_to(SCENES[scene]())
+    assert radius == REAL_TIME.radius
+    assert distinct_in_row(radius) == pytest.approx(distinct(2 * radius, 3), abs=0.005)
+    assert distinct(2 * radius, 3) > 0.97 * distinct(np.pi * radius**2, 3)
+
+
+@pytest.mark.claims("GRIS-A07", part="the radius in images of one dimension", world="flatland2d")
+def test_a_radius_scaled_to_an_inset_taken_for_the_film_meets_the_same_neighbours_again_and_again():
+    inset = SCENES["cornell"]()
+    alone = replace(inset.pinhole(), film=inset.pinhole().n, first=0)
+    radius = REAL_TIME.radius * alone.film / 1920
+    assert distinct_in_row(radius) < 0.6 * distinct(np.pi * REAL_TIME.radius**2, 3)
 
 
 @pytest.mark.claims("GRIS-A08")

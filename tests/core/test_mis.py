@@ -65,6 +65,7 @@ def faults(m, case: Inputs) -> list[str]:
 
 
 @pytest.mark.claims("GRIS-E04", "GRIS-A03")
+@pytest.mark.claims("GRIS-E36", "GRIS-E37", "GRIS-E38", part="partition of one")
 @every_weight
 @given(data=st.data())
 def test_weights_are_non_negative_and_sum_to_one_over_the_inputs_that_can_realise_y(name, data):
@@ -180,7 +181,7 @@ def test_weights_that_give_equal_densities_unequal_shares_are_noticed(m):
     assert abs(excess_over_share(m, alike)).max() > 0.01
 
 
-@pytest.mark.claims("GRIS-E37")
+@pytest.mark.claims("GRIS-E37", part="all inputs canonical")
 @every_formula
 @given(case=inputs(ALL_CANONICAL, columns=20))
 def test_where_all_inputs_are_canonical_weights_are_c_over_C(m, case):
@@ -204,7 +205,7 @@ def smallest_privilege(m, case: Inputs):
     return (sign * (relative - 1)).min()
 
 
-@pytest.mark.claims("GRIS-E38")
+@pytest.mark.claims("GRIS-E38", part="inequality of canonical and other inputs")
 @given(mixed(columns=1000))
 def test_defensive_canonical_weights_exceed_c_over_C_and_others_stay_below(case):
     assert smallest_privilege(WEIGHTS["defensive"].m, case) > -1e-12

@@ -20,7 +20,8 @@ def claim(id_="DEMO-C01", quick="reproduced", paper=None):
         "id": id_,
         **texts,
         "criterion": "0.5",
-        "worlds": [],
+        "worlds": ["toy1d"],
+        "scenes": [],
         "expected": {"quick": quick, "paper": paper},
     }
 
@@ -32,8 +33,12 @@ def project(folder, *demos, claims=CLAIMS):
     """A project of its own."""
     (folder / "tests").mkdir(parents=True, exist_ok=True)
     (folder / "ledger.json").write_text(json.dumps({"format": 1, "claims": list(claims)}))
-    modules = tuple(f"tests.figures.demos.{name}" for name in demos)
-    return Project(modules, folder / "ledger.json", folder / "tests")
+    return at(folder, tuple(f"tests.figures.demos.{name}" for name in demos))
+
+
+def at(folder, modules):
+    """The project in a folder."""
+    return Project(modules, folder / "ledger.json", folder / "tests", folder / "paper.json", folder / "benchmarks")
 
 
 def figures(here, *words):
@@ -62,8 +67,7 @@ def arrays(out):
 
 def from_command_line(folder, modules, *words):
     """The command on a project that another process has made."""
-    place = Path(folder)
-    return main(words, Project(tuple(modules.split(",")), place / "ledger.json", place / "tests"))
+    return main(words, at(Path(folder), tuple(modules.split(","))))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,8 @@ def marked(tmp_path, text):
     folder = tmp_path / "tests" / "deep"
     folder.mkdir(parents=True)
     (folder / "test_x.py").write_text("import pytest\n" + textwrap.dedent(text))
-    return {id_: tests for id_, tests in scan.tests_by_claim(tmp_path / "tests", KNOWN).items() if tests}
+    found = scan.marks_by_claim(tmp_path / "tests", KNOWN)
+    return {id_: [mark.test for mark in marks] for id_, marks in found.items() if marks}
 
 
 X = "tests/deep/test_x.py"
@@ -119,6 +120,34 @@ def test_a_bad_mark_is_named_with_its_place(tmp_path, words):
     assert words in str(error.value)
 
 
+def of_text(tmp_path, place, text):
+    """The marks of one test file."""
+    path = tmp_path / "tests" / place
+    path.parent.mkdir(parents=True)
+    path.write_text("import pytest\n" + textwrap.dedent(text))
+    return list(scan.marks(tmp_path / "tests"))
+
+
+@pytest.mark.parametrize(
+    ("place", "said", "world", "part"),
+    [
+        ("oracle/test_x.py", "", "toy1d", ""),
+        ("flatland/test_x.py", "", "flatland2d", ""),
+        ("test_x.py", "", "unit", ""),
+        ("oracle/test_x.py", ", part='finite cells'", "toy1d", "finite cells"),
+        ("transport/test_x.py", ", world='tracer3d'", "tracer3d", ""),
+    ],
+)
+def test_a_mark_has_a_world_and_may_show_a_part(tmp_path, place, said, world, part):
+    (mark,) = of_text(tmp_path, place, f"@pytest.mark.claims('A-1'{said})\ndef test_f(): pass\n")
+    assert (mark.world, mark.part) == (world, part)
+
+
+def test_a_mark_with_another_keyword_is_named(tmp_path):
+    with pytest.raises(FigureError, match="with part= and world= at most"):
+        of_text(tmp_path, "test_x.py", "@pytest.mark.claims('A-1', parts='x')\ndef test_f(): pass\n")
+
+
 # ---------------------------------------------------------------- the file
 
 
@@ -166,7 +195,14 @@ def test_the_ledger_joins_claims_tests_figures_and_verdicts(tmp_path, capsys):
         "class": "A",
         "tests": ["tests/test_x.py::test_f"],
         "figures": ["DEMO-F01"],
+        "evidence": [],
+        "benchmark": [],
+        "worlds": {"toy1d": "whole"},
+        "missing": [],
+        "parts": [],
+        "scenes": [],
         "verdict": "reproduced",
+        "paper": None,
         "sentence": "Sentence <DEMO-C01>.",
         "criterion": "0.5",
     }
@@ -180,7 +216,9 @@ def test_without_results_there_is_no_verdict(tmp_path, capsys):
 
 def test_the_ledger_is_a_table_too(tmp_path, capsys):
     assert figures(project(tmp_path), "ledger") == 0
-    assert "2 claims: 0 with tests, 0 with figures" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "2 claims: 0 with tests, 0 with figures, 0 with evidence, 0 with a benchmark" in said
+    assert "toy1d: 0 shown, 0 in part, 2 missing" in said
 
 
 def test_a_declared_claim_without_an_expected_verdict_is_listed(tmp_path):
@@ -202,4 +240,4 @@ def test_our_own_figures_declare_claims_of_our_ledger_with_expected_verdicts():
 
 def test_our_own_tests_mark_claims_of_our_ledger():
     here = registry.Project()
-    assert scan.tests_by_claim(here.tests, ledger.load(here.ledger))
+    assert scan.marks_by_claim(here.tests, ledger.load(here.ledger))

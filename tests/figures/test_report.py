@@ -93,7 +93,7 @@ def test_the_report_is_rebuilt_from_what_is_stored(done):
 
 
 DAMAGES = {
-    "claims.json": ("claims.json is not a record", b'{"format": 1}'),
+    "claims.json": ("claims.json is not a record", b'{"format": 2}'),
     "figure.png": ("figure.png is not a whole picture", b"\x89PNG"),
     "arrays.npz": ("arrays.npz cannot be read", b"PK"),
 }

@@ -2,21 +2,24 @@
 
 import itertools
 import json
+from dataclasses import replace
 
 import pytest
 
 from figures import record, verdicts
-from figures.criteria import above, below, within
+from figures.criteria import above, below, reported, within
 from figures.errors import FigureError
-from figures.figure import VERDICTS, Claim, undeclared, verdict_line, verdict_of, worst
+from figures.figure import VERDICTS, Claim, Conditions, Setup, undeclared, verdict_line, verdict_of, worst
 from figures.ledger import Row
 from figures.record import Check, Record
 from tests.figures.demos.sound import figure
 
 HIT, MISS = within(0, 0, 1), within(3, 0, 1)
 DECISIONS = {
+    "reported": Claim("A-1", reported(3.0)),
     "reproduced": Claim("A-1", HIT),
     "reproduced with caveat": Claim("A-1", HIT, caveat="only in flatland"),
+    "not judged": Claim("A-1", None, reason="too few frames"),
     "not reproduced": Claim("A-1", MISS, caveat="only in flatland"),
     "refuted": Claim("A-1", MISS, counter=above(3, 2)),
 }
@@ -37,6 +40,23 @@ def test_a_miss_without_certainty_of_the_opposite_is_no_refutation():
 
 def test_a_pass_is_no_refutation_whatever_the_counter_says():
     assert verdict_of(Claim("A-1", HIT, counter=HIT)) == "reproduced"
+
+
+def test_what_is_not_judged_says_why():
+    with pytest.raises(ValueError, match="A-1 'slope' is not judged: say why"):
+        Claim("A-1", None, "slope")
+
+
+FILM, INSET = Setup("real time", "moving", "all", "film"), Setup("real time", "moving", "all", "inset")
+OFFLINE = Setup("offline", "still", "all", "film")
+
+
+@pytest.mark.parametrize(
+    ("ours", "verdict"), [(FILM, "refuted"), (INSET, "refuted"), (OFFLINE, "not reproduced")], ids=str
+)
+def test_nothing_is_refuted_under_other_conditions_than_the_papers(ours, verdict):
+    under = Conditions(("A-1",), "Fig. 1", FILM, ours, "for speed")
+    assert verdict_of(DECISIONS["refuted"], under) == verdict
 
 
 @pytest.mark.parametrize(("a", "b"), list(itertools.combinations(VERDICTS, 2)))
@@ -62,12 +82,12 @@ def test_a_figure_checks_what_it_declares(checked, problem):
 
 
 def row(expected):
-    return Row("A-1", "A", "A", "", "", "", {"quick": expected, "paper": None})
+    return Row("A-1", "A", "A", "", "", "", (), (), {"quick": expected, "paper": None})
 
 
 def found(id_, *verdicts, status="done"):
     checks = tuple(Check("A-1", "", "", 1.0, "", verdict, "", "") for verdict in verdicts)
-    return Record(id_, "", "", "", "quick", 1, 1, ["A-1"], status, "", checks)
+    return Record(id_, "", "", "toy1d", "quick", 1, 1, ["A-1"], [], status, "", checks)
 
 
 def judged(records, expected, declared=("F-1",)):
@@ -94,6 +114,12 @@ BOTH = ("F-1", "F-2")
 )
 def test_a_claim_is_compared_once_all_its_figures_have_spoken(records, expected, declared, answer):
     assert judged(records, expected, declared) == answer
+
+
+def test_a_verdict_names_the_worlds_that_decided_it():
+    records = [found("F-1", "reproduced"), replace(found("F-2", "refuted"), world="flatland2d")]
+    (only,) = verdicts.judge(records, {"A-1": row(None)}, {"A-1": set(BOTH)})
+    assert (only.verdict, only.where) == ("refuted", "flatland2d")
 
 
 def test_kept_verdicts_are_read_back(tmp_path):
@@ -123,13 +149,14 @@ def test_a_kept_record_is_read_back(tmp_path):
 DAMAGES = {
     "no JSON": lambda data: "{",
     "not a dict": lambda data: "[]",
-    "another format": lambda data: json.dumps(data | {"format": 2}),
+    "another format": lambda data: json.dumps(data | {"format": 1}),
     "a field missing": lambda data: json.dumps({k: v for k, v in data.items() if k != "title"}),
     "a field too many": lambda data: json.dumps(data | {"more": 1}),
     "no verdict": lambda data: json.dumps(data | {"checks": [data["checks"][0] | {"verdict": "fine"}]}),
     "no number": lambda data: json.dumps(data | {"checks": [data["checks"][0] | {"measured": None}]}),
     "no text": lambda data: json.dumps(data | {"title": 3}),
     "another figure": lambda data: json.dumps(data | {"id": "F-2"}),
+    "half a condition": lambda data: json.dumps(data | {"conditions": [{"claims": ["A-1"]}]}),
 }
 
 

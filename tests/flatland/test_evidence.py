@@ -146,6 +146,57 @@ def test_a_later_run_of_one_job_leaves_the_others_alone(tmp_path, monkeypatch) -
     assert before == after
 
 
+def other_code() -> Job:
+    return replace(counted([]), identity=lambda _: "another code")
+
+
+def more_chunks() -> Job:
+    return replace(counted([]), chunks=lambda share: [{"part": part} for part in parts(6, share)])
+
+
+STALE = {
+    "what was measured": ({"job 0": counted([])}, []),
+    "other code": ({"job 0": other_code()}, ["job 0: code or references have changed since it was measured at"]),
+    "other chunks": ({"job 0": more_chunks()}, ["job 0: code or references have changed since it was measured at"]),
+    "a new job": ({"job 0": counted([]), "job 1": red()}, ["job 1: never measured"]),
+    "a job that is gone": ({}, ["job 0: is filed, but no job any more"]),
+}
+
+
+@pytest.mark.parametrize(("today", "said"), STALE.values(), ids=STALE)
+def test_stale_evidence_is_named_and_ends_with_1(tmp_path, monkeypatch, capsys, today, said) -> None:
+    main(tmp_path, monkeypatch, counted([]))
+    monkeypatch.setattr(jobs, "JOBS", MappingProxyType(today))
+    capsys.readouterr()
+    assert evidence.main(["--stale", f"--results={tmp_path / 'checkout'}"]) == int(bool(said))
+    lines = capsys.readouterr().out.splitlines()[: len(said)]
+    assert [line[: len(words)] for line, words in zip(lines, said, strict=True)] == said
+
+
+def test_evidence_at_a_share_of_its_counts_is_stale(tmp_path, monkeypatch) -> None:
+    main(tmp_path, monkeypatch, counted([]))
+    path = tmp_path / "checkout" / report.JSON
+    found = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps({"job 0": found["job 0"] | {"share": 0.1}}), encoding="utf-8")
+    assert report.stale({"job 0": counted([])}, tmp_path / "checkout") == ["job 0: measured at 0.1 of its counts only"]
+
+
+def test_the_digest_of_code_sees_the_numbers_beside_a_module(tmp_path, monkeypatch) -> None:
+    def digest(number: float) -> str:
+        for cached in (job.code, job._imports, job._syntax):
+            cached.cache_clear()
+        np.savez(tmp_path / "figures" / "references.npz", mean=number)
+        return job.code("benchmarks.one")
+
+    monkeypatch.setattr(job, "ROOT", tmp_path)
+    plant(tmp_path, "benchmarks/one.py", "from figures.references import reference")
+    plant(tmp_path, "figures/__init__.py", "")
+    plant(tmp_path, "figures/references.py", "def reference():\n    pass\n")
+    assert digest(1.0) == digest(1.0) != digest(2.0)
+    for cached in (job.code, job._imports, job._syntax):
+        cached.cache_clear()
+
+
 # ---------------------------------------------------------------- how means are judged
 
 

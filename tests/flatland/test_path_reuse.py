@@ -46,7 +46,7 @@ def change_of_tiles(scene: str) -> float:
 ONE_ALBEDO = ["ajar", "nearly_closed", "crease", "furnace"]
 
 
-@pytest.mark.claims("COM-B02")
+@pytest.mark.claims("COM-B02", part="inside tiles")
 @pytest.mark.parametrize("scene", ONE_ALBEDO)
 def test_where_all_is_lambert_of_one_albedo_light_only_moves_inside_tiles(scene) -> None:
     """f_j / p_j is the same for all pixels, so that sum_j f_j / sum_k p_k = f_i / p_i: samples are handed out whole."""
@@ -69,7 +69,7 @@ def test_densities_that_count_pixels_behind_an_obstacle_lose_light(monkeypatch) 
     assert change_of_tiles("crease") > 1e-3
 
 
-@pytest.mark.claims("COM-B02")
+@pytest.mark.claims("COM-B02", part="a pixel's sum")
 @pytest.mark.parametrize("scene", ["cornell", "clear_coat", "occluders"])
 def test_a_pixel_sums_f_over_the_densities_of_its_whole_tile(scene) -> None:
     t = tracer(scene)
@@ -83,7 +83,7 @@ def test_a_pixel_sums_f_over_the_densities_of_its_whole_tile(scene) -> None:
     assert path_reuse(t, np.arange(TILE), Live(np.random.default_rng(2)))[0] == pytest.approx(image, rel=1e-12)
 
 
-@pytest.mark.claims("COM-B02")
+@pytest.mark.claims("COM-B02", part="to 2 %, through a door")
 def test_path_reuse_agrees_with_radiosity_through_a_door() -> None:
     truth = radiosity("ajar", TILE, (104, 120, 136, 152))
     images = np.concatenate([with_and_without(tracer("ajar"), 1024, seed)[0] for seed in range(4)])
@@ -99,7 +99,7 @@ def largest_z(scene: str, replicas: int, seed: int) -> tuple[float, float]:
     return float(np.abs(change.mean(axis=0) / error).max()), sidak(TILE, 64)
 
 
-@pytest.mark.claims("COM-B02")
+@pytest.mark.claims("COM-B02", part="to 2 %, pixel by pixel")
 @pytest.mark.parametrize("scene", ["cornell", "glossy_cornell", "clear_coat", "occluders"])
 def test_path_reuse_changes_no_pixel_s_mean(scene) -> None:
     z, limit = largest_z(scene, 2048, seed=4)
@@ -114,7 +114,7 @@ def one_tile(walls: Material, facets: list[Facet], eye: tuple[float, float] = (0
     return Tracer(compiled(PLANE, [walls], facets), Pinhole(eye, (0.5, 0.0), TILE, film=TILE), 3, RECONNECTION)
 
 
-@pytest.mark.claims("COM-B02")
+@pytest.mark.claims("COM-B02", part="thin walls")
 def test_a_tile_that_sees_both_sides_of_a_thin_wall_hands_its_light_out_whole() -> None:
     thin = [*room(0), *chain([(0.5, 0.0), (0.5, 0.5)], 0), *chain(LAMP, 0, 8.0)]
     reused, alone = with_and_without(one_tile(matte(0.5), thin, (0.5, 0.9)), 64, 1)
@@ -136,7 +136,7 @@ def test_pixels_of_a_tile_see_of_a_sample_the_f_over_p_that_shifts_to_them_find(
     assert found > TILE
 
 
-@pytest.mark.claims("COM-B02")
+@pytest.mark.claims("COM-B02", part="black lobes")
 def test_black_lobes_take_no_part() -> None:
     """A furnace of albedo .5, half of whose samples would go to a black lobe."""
     black = Material([Layer("lambert", (0.5,), weight=0.5), Layer("lambert", (0.0,), weight=0.5)])

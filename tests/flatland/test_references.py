@@ -116,16 +116,16 @@ def test_what_is_stored_comes_back_and_the_better_reference_stays(tmp_path) -> N
     path = tmp_path / "references.npz"
     save({"cornell": some(0.1)}, path)
     save({"ajar": some(0.2), "cornell": some(0.3)}, path)
-    assert reference("ajar", path).error[0] == 0.2
-    assert reference("cornell", path).image_error == 0.1
-    assert reference("cornell", path).how == "by hand"
+    assert reference("ajar", path=path).error[0] == 0.2
+    assert reference("cornell", path=path).image_error == 0.1
+    assert reference("cornell", path=path).how == "by hand"
 
 
 def test_a_missing_reference_and_a_damaged_file_are_told_apart(tmp_path) -> None:
     path = tmp_path / "references.npz"
     with pytest.raises(FigureError, match=r"no reference of the scene 'cornell'.*make evidence"):
-        reference("cornell", path)
+        reference("cornell", path=path)
     save({"cornell": some(0.1)}, path)
     path.write_bytes(path.read_bytes()[:-40])
     with pytest.raises(FigureError, match="cannot be used"):
-        reference("cornell", path)
+        reference("cornell", path=path)

@@ -50,7 +50,7 @@ def film(rng, rule: str = "hybrid", across: str = "defensive", scene: str = "cor
     return shade(X, here)[0]
 
 
-@pytest.mark.claims("COM-A07")
+@pytest.mark.claims("COM-A07", part="a chunk is replayed by its key")
 def test_a_chunk_is_replayed_to_the_last_bit_by_seed_and_number_and_by_nothing_else() -> None:
     once, again = Recorded(), Recorded()
     assert film(once).tobytes() == film(again).tobytes()
@@ -67,7 +67,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.claims("COM-A07")
+@pytest.mark.claims("COM-A07", part="two methods on the same numbers")
 @pytest.mark.parametrize("other", OTHERS.values(), ids=OTHERS)
 def test_another_method_draws_the_same_number_for_every_frame_stage_replica_and_pixel(other) -> None:
     one, two = Recorded(), Recorded()
@@ -78,7 +78,7 @@ def test_another_method_draws_the_same_number_for_every_frame_stage_replica_and_
     assert all(each.shape[-1] == PIXELS * REPLICAS for each in one.drawn)
 
 
-@pytest.mark.claims("COM-A07")
+@pytest.mark.claims("COM-A07", part="two methods on the same numbers")
 def test_pairs_on_the_same_numbers_differ_less_than_strangers() -> None:
     """The variance of the difference of two kinds of weights, with common and with independent numbers."""
     one = np.concatenate([film(Recorded(chunk=k)) for k in range(5)])

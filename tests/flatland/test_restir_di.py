@@ -56,7 +56,7 @@ def images(t: Tracer, mis: Weights, batches: int) -> Array:
     return np.concatenate(found)
 
 
-@pytest.mark.claims("COM-B04")
+@pytest.mark.claims("COM-B04", part="the unbiased variant, to 2 %")
 @pytest.mark.parametrize("name", DEBIASED)
 def test_restir_di_whose_weights_see_obstacles_is_unbiased(name) -> None:
     t = tracer("many_lights")
@@ -66,7 +66,7 @@ def test_restir_di_whose_weights_see_obstacles_is_unbiased(name) -> None:
     assert unbiased(estimates[:, edges].mean(axis=1), truth[edges].mean(), eps=0.02).passed
 
 
-@pytest.mark.claims("COM-B04")
+@pytest.mark.claims("COM-B04", part="the biased variant")
 def test_restir_di_that_counts_all_inputs_is_too_dark_at_the_edges_of_shadows() -> None:
     t = tracer("many_lights")
     estimates, truth, edges = images(t, BIASED, 4), quadrature(t), shadow_edges(t.scene, t.sensor, RADIUS)
@@ -95,7 +95,7 @@ def whole_images(t: Tracer, chance: Live) -> tuple[Array, Array]:
     return ours, np.asarray(sum(F for _, _, F in leaves(tree)))
 
 
-@pytest.mark.claims("COM-B08")
+@pytest.mark.claims("COM-B08", part="to 2 %")
 def test_path_tracing_with_restir_di_agrees_with_radiosity() -> None:
     t = tracer("matte_cornell", 32)
     truth = radiosity("matte_cornell", 32, (44, 52, 60, 68))
@@ -104,7 +104,7 @@ def test_path_tracing_with_restir_di_agrees_with_radiosity() -> None:
     assert unbiased(ours, truth, eps=0.02).passed
 
 
-@pytest.mark.claims("COM-B08")
+@pytest.mark.claims("COM-B08", part="to 2 %")
 @pytest.mark.parametrize("scene", ["glossy_cornell", "clear_coat", "glass_disc"])
 def test_restir_di_stands_for_just_the_direct_light_of_path_tracing(scene) -> None:
     setting, chance = SCENES[scene](), Live(np.random.default_rng(4))

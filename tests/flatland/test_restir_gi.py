@@ -53,7 +53,7 @@ def difference(scene: str, mis: str) -> float:
     return float(np.abs(gi - pt).max() / pt.mean())
 
 
-@pytest.mark.claims("GRIS-C11", "COM-B03")
+@pytest.mark.claims("GRIS-C11", "COM-B03", part="equality on Lambert")
 @pytest.mark.parametrize("mis", ["defensive", "1/Z"])
 @pytest.mark.parametrize("scene", MATTE)
 def test_where_all_is_lambert_restir_gi_is_restir_pt_for_the_same_random_numbers(scene, mis) -> None:
@@ -88,7 +88,7 @@ def images(system: str, scene: str, mis: str, batches: int) -> Iterator[tuple[Ar
         yield shade(Y, here)[0].reshape(REPLICAS, PIXELS), shade(X, here)[0].reshape(REPLICAS, PIXELS)
 
 
-@pytest.mark.claims("GRIS-C11", "COM-B03")
+@pytest.mark.claims("GRIS-C11", "COM-B03", part="ReSTIR GI on Lambert, to 2 %")
 def test_restir_gi_agrees_with_radiosity_where_all_is_lambert() -> None:
     truth = radiosity("matte_cornell", PIXELS, (44, 52, 60, 68))
     ours = np.concatenate([reused.mean(axis=1) for reused, _ in images("GI", "matte_cornell", "1/Z", 2)])
@@ -102,7 +102,7 @@ def glossy(system: str, batches: int) -> tuple[Array, Array]:
     return mean_and_blocks(reused - first) + truth, truth
 
 
-@pytest.mark.claims("GRIS-C11", "COM-B03")
+@pytest.mark.claims("GRIS-C11", "COM-B03", part="ReSTIR GI on glossy surfaces")
 def test_restir_gi_is_biased_on_glossy_surfaces() -> None:
     """It smears what they reflect, too bright here and too dark there; the mean of the image hardly shows it."""
     estimates, truth = glossy("GI", 40)
@@ -111,7 +111,7 @@ def test_restir_gi_is_biased_on_glossy_surfaces() -> None:
     assert abs(estimates[:, 0].mean() / truth[0] - 1) < 0.01
 
 
-@pytest.mark.claims("GRIS-C11")
+@pytest.mark.claims("GRIS-C11", part="ReSTIR PT on glossy surfaces, to 2 %")
 def test_restir_pt_is_not() -> None:
     estimates, truth = glossy("PT", 20)
     assert all_unbiased(estimates, truth, eps=0.02).passed

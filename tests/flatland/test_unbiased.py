@@ -216,7 +216,7 @@ def some_frames(count: int) -> Paired:
 @pytest.mark.claims("GRIS-A06", "GRIS-C09")
 def test_averages_of_offline_frames_are_unbiased_and_converge() -> None:
     found = some_frames(1024)
-    assert bias(found.added, found.initial).is_none(0.02)
+    assert bias(found.added, found.initial).is_none(0.005)
     assert error_slope(found.initial + found.added) == pytest.approx(-1, abs=0.07)
 
 

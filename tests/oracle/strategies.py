@@ -7,12 +7,22 @@ import numpy as np
 from hypothesis import strategies as st
 
 from restir_ref.batch import Array
+from restir_ref.integrals import pdf
+from restir_ref.mis import WEIGHTS, Weights, defensive, one_over_z, pairwise, talbot
 from restir_ref.oracle.cells import Frame, cells
 from restir_ref.oracle.scenes import Scene, paired
 
 VOLUMES = [0.25, 0.5, 1.0, 2.0]
 TARGETS = [0.0, 0.5, 1.0, 3.0]  # zeros that samplers reach
 DENSITIES = [0, 1, 1, 2, 4]  # zeros: samplers that do not cover
+
+TRACTABLE = {
+    "talbot": Weights(talbot, proxy=pdf),
+    "pairwise": Weights(pairwise, proxy=pdf),
+    "defensive": Weights(defensive, proxy=pdf),
+    "1/Z": Weights(WEIGHTS["1/Z"].m, one_over_z, proxy=pdf),
+}
+"""Weights that compare the known densities of raw candidates.  [GRIS 5.6]"""
 
 
 def table(draw: st.DrawFn, shape: tuple[int, ...], values: list[float]) -> Array:

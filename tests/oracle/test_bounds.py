@@ -189,7 +189,7 @@ def test_weights_without_a_bound_exceed_the_realised_one_of_the_sum(name) -> Non
     assert np.max(exceeded, axis=-1).min() > 1.1
 
 
-@pytest.mark.claims("GRIS-E26")
+@pytest.mark.claims("GRIS-E26", part="the bounded case")
 @every_robust_weight
 @given(scene=mismatched(), c=confidences)
 def test_contributions_stay_below_C_f_times_the_bound_of_the_sum(mis, scene, c) -> None:
@@ -203,7 +203,7 @@ def test_contributions_stay_below_C_f_times_the_bound_of_the_sum(mis, scene, c) 
     assert (bounds.largest(contribution, 2)[0] <= bound * (1 + 1e-12)).all()
 
 
-@pytest.mark.claims("GRIS-E26")
+@pytest.mark.claims("GRIS-E26", part="the constant C_f")
 def test_a_target_that_vanishes_where_f_does_not_is_not_reasonable() -> None:
     f, p_hat = np.array([[1.0, 2.0], [1.0, 2.0], [0.0, 0.0]]), np.array([[1.0, 4.0], [0.0, 4.0], [0.0, 1.0]])
     assert bounds.reasonable(f, p_hat).tolist() == [1.0, np.inf, 0.0]
@@ -239,7 +239,7 @@ def coin(n: int = 1) -> Frame:
     return Frame(cells(np.full((n, 2), 0.5), f, np.ones((1, n, 2)), paired(n, 2, {})), n)
 
 
-@pytest.mark.claims("GRIS-E41")
+@pytest.mark.claims("GRIS-E41", part="the bound")
 @given(scene=scenes(n=1), M=st.integers(1, 4))
 def test_the_variance_of_independent_weights_is_below_popoviciu(scene, M) -> None:
     tables = scene.now.cells
@@ -249,13 +249,13 @@ def test_the_variance_of_independent_weights_is_below_popoviciu(scene, M) -> Non
     assert bound == pytest.approx(bounds.equal_popoviciu(C, M, M))
 
 
-@pytest.mark.claims("GRIS-E41")
+@pytest.mark.claims("GRIS-E41", part="a case that attains the bound")
 @pytest.mark.parametrize("M", [1, 2, 5])
 def test_a_coin_attains_popoviciu(M) -> None:
     assert variance_of_sum(coin(), M, 0)[0] == pytest.approx(float(bounds.equal_popoviciu(2.0, M, M)))
 
 
-@pytest.mark.claims("GRIS-E42")
+@pytest.mark.claims("GRIS-E42", part="the bound, up to 4 inputs")
 @given(scene=scenes(n=1), M=st.integers(1, 4), hold=st.sampled_from([0.5, 0.9, 1.0]))
 def test_a_sticky_chain_has_the_variance_the_figure_takes_and_stays_below_its_bound(scene, M, hold) -> None:
     tables = scene.now.cells
@@ -265,7 +265,7 @@ def test_a_sticky_chain_has_the_variance_the_figure_takes_and_stays_below_its_bo
     assert sticky <= bounds.dependent_bound(C, M, hold ** np.arange(1, M + 1)) * (1 + 1e-12)
 
 
-@pytest.mark.claims("GRIS-E42", "GRIS-C05")
+@pytest.mark.claims("GRIS-E42", "GRIS-C05", part="dependent inputs")
 def test_dependent_weights_exceed_the_bound_of_independent_ones() -> None:
     assert variance_of_sum(coin(), 4, 0.9) > 3 * bounds.equal_popoviciu(2.0, 4, 4)
 

@@ -1,6 +1,7 @@
 """What the selected sample converges to, and how fast: exact laws of Y, for one input and for many.  [GRIS 4.4, 5.2]"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 from math import factorial, prod
 
@@ -11,14 +12,15 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from figures import criteria, gris_a2
+from figures.exact import integral
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
-from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.integrals import Pixels, Reservoirs, pdf
 from restir_ref.mis import WEIGHTS, Weights
 from restir_ref.oracle.bounds import limit_variance
 from restir_ref.oracle.cells import Frame
 from restir_ref.oracle.laws import expected_weight
-from restir_ref.oracle.moments import drawn, reused
+from restir_ref.oracle.moments import copies, drawn, mapped, resampled, reused, variance
 from restir_ref.oracle.scenes import Loop, reference_scene, spatial_loop, three_pixel_scene
 from restir_ref.oracle.selected import (
     contribution_variance,
@@ -29,8 +31,9 @@ from restir_ref.oracle.selected import (
     share,
 )
 from restir_ref.resampling import Candidate, Input, gris, select
-from restir_ref.restir import initial
-from tests.oracle.strategies import scenes
+from restir_ref.restir import initial, shade
+from tests.core.stubs import live
+from tests.oracle.strategies import TRACTABLE, scenes
 from toy1d import overlapping_supports, quotient
 
 ROBUST = {name: WEIGHTS[name] for name in ("talbot", "pairwise", "defensive")}
@@ -218,7 +221,9 @@ def seven_domains(mis: str, n: int) -> tuple[float, float]:
     return gris_a2.centre(frame, drawn(frame), WEIGHTS[mis], n)[:2]
 
 
-@pytest.mark.claims("GRIS-E23", "GRIS-TA3")
+@pytest.mark.claims("GRIS-E23")
+@pytest.mark.claims("GRIS-TA3", part="the variance for p_hat = f")
+@pytest.mark.claims("GRIS-E36", "GRIS-E37", "GRIS-E38", part="slope on T7")
 @pytest.mark.parametrize("name", ROBUST)
 def test_with_samples_of_other_domains_the_density_converges_and_the_variance_is_exactly_1_over_n(name) -> None:
     l1, V = np.transpose([seven_domains(name, 4**k) for k in range(6)])
@@ -231,6 +236,66 @@ def test_with_samples_of_other_domains_the_density_converges_and_the_variance_is
 def test_with_1_over_Z_weights_neither_converges() -> None:
     (l1, _), (late, _) = (seven_domains("1/Z", n) for n in (1, 1024))
     assert late > 0.5 * l1
+
+
+# ---------------------------------------------------------------- known densities instead of targets
+
+
+def moments_of_the_estimate(mis: Weights, n: int) -> tuple[float, float]:
+    """(E, Var) of f(Y) W_Y of T7's centre pixel relative to the integral, exactly: n raw samples per pixel."""
+    frame, counts = quotient(overlapping_supports(), 168), np.full(7, n)
+    f = frame.cells.f[gris_a2.CENTRE]
+    samples = copies(drawn(frame), np.repeat(counts, len(f)))
+    Y = mapped(resampled(samples, [reused(frame, gris_a2.CENTRE, counts, mis)]), f[None])
+    truth = float(f @ frame.cells.v[gris_a2.CENTRE])
+    return float(Y.mean[0]) / truth, float(variance(Y)[0]) / truth**2
+
+
+N_EACH = 2 ** np.arange(9)
+
+
+@pytest.mark.claims("GRIS-A20")
+@pytest.mark.parametrize("name", ["talbot", "pairwise", "defensive"])
+def test_with_known_densities_in_the_weights_seven_domains_are_unbiased_and_the_variance_falls_like_1_over_n(name):
+    mean, V = np.transpose([moments_of_the_estimate(TRACTABLE[name], int(n)) for n in N_EACH])
+    assert mean == pytest.approx(1, abs=1e-12)
+    assert criteria.slope_within(N_EACH, V, -1, 0.1).passed
+
+
+@pytest.mark.claims("GRIS-A20")
+def test_with_known_densities_constant_weights_do_not_converge_or_are_biased() -> None:
+    of_one_over_Z = [moments_of_the_estimate(TRACTABLE["1/Z"], int(n))[1] for n in N_EACH]
+    assert criteria.slope(N_EACH, of_one_over_Z) > -0.35
+    assert moments_of_the_estimate(replace(WEIGHTS["constant"], proxy=pdf), 1)[0] < 0.95
+
+
+def raw_pass(mis: Weights, n: int, columns: int, chance: Chance) -> Array:
+    """f(Y) W_Y of T7's centre pixel from n raw samples per pixel, by the pass itself; (columns,)."""
+    line = overlapping_supports()
+    at = [Pixels(line, np.full(columns, pixel)) for pixel in range(line.n)]
+    here, inputs = at[gris_a2.CENTRE], []
+    for each in at * n:
+        ((x, W),) = line.candidates(each.index, chance)
+        inputs.append(Input(Reservoirs(x, W, np.ones(columns)), each))
+    return shade(gris(inputs, here, mis, chance), here)[0]
+
+
+@pytest.mark.claims("GRIS-A20", part="bias of sampled passes")
+@pytest.mark.parametrize("name", ["talbot", "pairwise", "defensive"])
+def test_with_known_densities_in_the_weights_sampled_passes_are_unbiased_to_half_a_per_cent(name) -> None:
+    truth = integral(overlapping_supports(), gris_a2.CENTRE)
+    found = raw_pass(TRACTABLE[name], 2, 64 * 500, live())
+    assert criteria.unbiased(found.reshape(64, -1).mean(axis=1), truth).passed
+
+
+@pytest.mark.claims("GRIS-A20", part="bias of sampled passes")
+def test_with_known_densities_constant_weights_are_seen_to_be_biased() -> None:
+    truth = integral(overlapping_supports(), gris_a2.CENTRE)
+    found = raw_pass(replace(WEIGHTS["constant"], proxy=pdf), 2, 64 * 500, live())
+    assert criteria.biased(found.reshape(64, -1).mean(axis=1), truth, -1, -0.01).passed
+
+
+# ---------------------------------------------------------------- a target that does not fit
 
 
 def mismatched_wave() -> tuple[float, float]:

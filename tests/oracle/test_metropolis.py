@@ -147,7 +147,8 @@ def compositions(draw: st.DrawFn) -> list[str]:
     return draw(st.lists(st.sampled_from(["temporal", "spatial", "mutate"]), min_size=1, max_size=3))
 
 
-@pytest.mark.claims("GRIS-E08", "MCMC-E06")
+@pytest.mark.claims("GRIS-E08", part="finite cells")
+@pytest.mark.claims("MCMC-E06")
 @given(scene=scenes(n=2, K=2, frames=2), names=compositions())
 def test_any_composition_of_resampling_passes_and_mutations_gives_an_unbiased_weight(scene, names) -> None:
     assert abs(bias_of(composed(scene, names), scene.v, scene.support)).max() < 1e-13

@@ -29,19 +29,20 @@ def largest_bias(loop: Loop, scene: Scene) -> float:
     return float(abs(bias_of(loop, scene.v, scene.support)).max())
 
 
-@pytest.mark.claims("GRIS-E08", "GRIS-E09", "GRIS-TA1")
+@pytest.mark.claims("GRIS-E08", "GRIS-E09", "GRIS-TA1", part="finite cells, initial samples")
 @given(scenes(n=1, K=4))
 def test_an_initial_sample_is_unbiased(scene: Scene) -> None:
     assert largest_bias(spatial_loop(scene, WEIGHTS["talbot"], 0), scene) < 1e-13
 
 
-@pytest.mark.claims("GRIS-E05")
+@pytest.mark.claims("GRIS-E05", part="finite cells")
 @given(scenes(n=1, K=4, techniques=3))
 def test_candidates_of_techniques_that_do_not_all_cover_are_unbiased(scene: Scene) -> None:
     assert largest_bias(spatial_loop(scene, WEIGHTS["talbot"], 0), scene) < 1e-13
 
 
-@pytest.mark.claims("GRIS-E07", "GRIS-E08", "GRIS-E16", "GRIS-E21", "GRIS-E36", "GRIS-E37", "GRIS-E38")
+@pytest.mark.claims("GRIS-E07", "GRIS-E08", "GRIS-E16", "GRIS-E21", part="finite cells, one spatial pass")
+@pytest.mark.claims("GRIS-E36", "GRIS-E37", "GRIS-E38", part="finite cells, one spatial pass")
 @every_promising_weight
 @given(scene=scenes(n=3), passes=st.just(1))
 def test_one_spatial_pass_is_unbiased(mis, scene, passes) -> None:
@@ -60,7 +61,7 @@ def test_spatial_reuse_of_two_technique_samples_is_unbiased(mis, scene) -> None:
     assert largest_bias(spatial_loop(scene, mis, 1), scene) < 1e-13
 
 
-@pytest.mark.claims("GRIS-A05", "GRIS-A18")
+@pytest.mark.claims("GRIS-A05", "GRIS-A18", part="finite cells, two frames")
 @every_promising_weight
 @given(scene=scenes(n=2, frames=2), cap=CAPS, data=st.data())
 def test_two_frames_with_holes_and_capped_confidences_are_unbiased(mis, scene, cap, data) -> None:
@@ -80,7 +81,7 @@ def test_the_oracle_says_exactly_one_in_rational_numbers(scene, cap) -> None:
     assert (bias == 0).all()
 
 
-@pytest.mark.claims("GRIS-C03")
+@pytest.mark.claims("GRIS-C03", part="bias of 1/M")
 @given(scenes(n=2, K=4))
 def test_constant_weights_over_unequal_supports_are_biased_by_exactly_Z_over_M(scene: Scene) -> None:
     bias = bias_of(spatial_loop(scene, WEIGHTS["constant"], 1), scene.v, scene.support)
@@ -99,7 +100,7 @@ def realising(scene: Scene) -> Array:
     return Z
 
 
-@pytest.mark.claims("GRIS-C03")
+@pytest.mark.claims("GRIS-C03", part="canonical inputs are unbiased")
 @given(st.data())
 def test_constant_weights_are_unbiased_where_all_inputs_are_canonical(data) -> None:
     """Same domain, identity shift and full coverage: every input can realise every y."""
@@ -113,7 +114,7 @@ def test_constant_weights_are_unbiased_where_all_inputs_are_canonical(data) -> N
     assert largest_bias(spatial_loop(canonical, WEIGHTS["constant"], 2), canonical) < 1e-13
 
 
-@pytest.mark.claims("GRIS-E15")
+@pytest.mark.claims("GRIS-E15", part="nothing beyond the support")
 @given(scenes(n=2))
 def test_nothing_is_ever_selected_outside_the_support_of_the_target(scene: Scene) -> None:
     bias = bias_of(spatial_loop(scene, WEIGHTS["talbot"], 1), scene.v, scene.support)

@@ -118,6 +118,48 @@ def test_ris_with_three_densities_is_unbiased_and_with_even_weights_is_not(pixel
     assert biased(groups_of_means(evenly(here)), truth, -1, -0.01).passed
 
 
+COLUMNS = 64 * 4000
+FUNCTIONS = {
+    "p_hat": lambda line, pixel, x: line.f(pixel, x),
+    "left half": lambda line, pixel, x: np.where(x < 0.5, 1.0, 0.0),
+    "another bump": lambda line, pixel, x: np.exp(-(((x - 0.6) / 0.2) ** 2)),
+}
+"""Of them only the first is the target."""
+
+
+def integrated(pixel: int, name: str) -> float:
+    """int f by the midpoint rule."""
+    x = (np.arange(20_000) + 0.5) / 20_000
+    return float(FUNCTIONS[name](known_densities(), np.full(len(x), pixel), x).mean())
+
+
+def selected_by_ris(pixel: int, name: str) -> tuple[Array, Array, Array]:
+    """f(Y), W_Y and 1 / p(Y) of RIS over one candidate of each technique, all as likely: p = (p_1 + p_2 + p_3) / 3."""
+    line = known_densities()
+    here = Pixels(line, np.full(COLUMNS, pixel))
+    Y = initial(here, live(4))
+    p = sum(each.pdf(here.index, Y.x) for each in line.techniques) / 3
+    return FUNCTIONS[name](line, here.index, Y.x), Y.W, 1 / p
+
+
+every_function = pytest.mark.parametrize(("pixel", "name"), [(pixel, name) for pixel in (0, 1) for name in FUNCTIONS])
+
+
+@pytest.mark.claims("GRIS-E03", part="continuous, T1")
+@every_function
+def test_ris_integrates_functions_that_are_not_its_target(pixel, name):
+    f, W, _ = selected_by_ris(pixel, name)
+    assert unbiased(groups_of_means(f * W), integrated(pixel, name)).passed
+
+
+@pytest.mark.claims("GRIS-E03", part="continuous, T1")
+@every_function
+def test_the_reciprocal_density_of_the_chosen_candidate_integrates_nothing(pixel, name):
+    f, _, one_over_p = selected_by_ris(pixel, name)
+    found, truth = groups_of_means(f * one_over_p), integrated(pixel, name)
+    assert biased(found, truth, -1, -0.01).passed or biased(found, truth, 0.01, np.inf).passed
+
+
 # ---------------------------------------------------------------- colours and pictures
 
 

@@ -101,7 +101,7 @@ def test_the_mean_of_one_frame_is_that_frame():
     assert (frames[1:] != means[1:]).all()
 
 
-@pytest.mark.claims("GRIS-F09t")
+@pytest.mark.claims("GRIS-F09t", part="caps 1, 5 and 20")
 @pytest.mark.parametrize("cap", [1, 5, 20])
 def test_temporal_reuse_alone_has_the_variance_of_an_exponential_average(cap):
     assert gris_f09.exactly_alone(cap, 12 * (cap + 1)) == pytest.approx(1, abs=1e-6)

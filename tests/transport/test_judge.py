@@ -85,10 +85,11 @@ def test_copies_to_the_end_are_acquitted_in_any_dimension(copy, space):
     assert not found.red, report(found)
 
 
-@pytest.mark.claims("GRIS-A09")
+@pytest.mark.claims("GRIS-A09", part="a room of triangles", world="tracer3d")
+@pytest.mark.parametrize("rule", ["hybrid", "reconnection"])
 @pytest.mark.parametrize("space", ["solid", "hyper"])
-def test_so_is_reconnecting(space):
-    found = judged(PathIntegrals(furnished(space, HYBRID)))
+def test_so_is_reconnecting(space, rule):
+    found = judged(PathIntegrals(furnished(space, RULES[rule])))
     assert not found.red, report(found)
 
 

@@ -1,55 +1,154 @@
-"""The geometric Jacobian of a reconnection, |cos_y / cos_x| (r_x / r_y)^(d-1), by finite differences.  [GRIS Eq. 52]"""
+"""The reconnection Jacobian in directions, |cos_y / cos_x| (r_x / r_y)^(d-1), by finite differences.  [GRIS Eq. 52]
+
+The rays that are turned meet walls and a ball in d = 2, 3 and 4; the Jacobian is the code's own, once as
+`direction_measure` has it, once as J = A(y) / A(x) of `shifts` brought to directions by dw = du / p.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pytest
 
-every_dimension = pytest.mark.parametrize("d", [2, 3, 4])
-H = 1e-5
+from restir_ref.batch import Array, ratio, take
+from restir_ref.integrals import Pixels
+from restir_ref.transport.direction_measure import Walk, reconnection_jacobian, shift_walk, walk
+from restir_ref.transport.paths import RECONNECTION
+from restir_ref.transport.reading import extended_path
+from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.transport.vectors import norm, normalize
+from restir_ref.transport.zoo import WRONG_SHIFTS
+from tests.transport.furnished import furnished_shifts
+from tests.transport.paths import Shifts
+from tests.transport.spaces import SPACES
+
+every_dimension = pytest.mark.parametrize("name", SPACES)
+
+CONFIGURATIONS = 200
+STEP = 1e-4
+"""How far x_c moves, in units of the shorter connection and of the smaller cosine."""
 
 
-def geometry(d: int, seed: int) -> tuple[np.ndarray, ...]:
-    """x_i, y_i above the plane through z with normal n: one random configuration."""
-    rng = np.random.default_rng(seed)
-    n = rng.normal(size=d)
-    n /= np.linalg.norm(n)
-    z = rng.normal(size=d)
-    x, y = (z + v + (1.5 - n @ v) * n for v in rng.normal(size=(2, d)))
-    return x, y, z, n
+@dataclass(frozen=True)
+class Reconnected:
+    """Pairs of paths that share x_c, in both measures, and |dw_y / dw_x| by turning the ray from x_(c-1)."""
+
+    s: Shifts
+    x: Walk
+    y: Walk
+    measured: Array
 
 
-def formula(x, y, z, n, power: int) -> float:
-    """dw_y / dw_x with the distances to the given power."""
-    r_x, r_y = np.linalg.norm(z - x), np.linalg.norm(z - y)
-    return float(abs(((z - y) @ n / r_y) / ((z - x) @ n / r_x)) * (r_x / r_y) ** power)
+@cache
+def reconnected(name: str) -> Reconnected:
+    """The first random configurations whose connection stands and stays on its primitive while the ray turns."""
+    s = furnished_shifts(name, RECONNECTION, 4000, seed=31)
+    s = columns(s, np.flatnonzero((s.x.c > 0) & (s.J > 0) & (s.i != s.j) & s.x.F.any(axis=0)))
+    x = walk(s.t, extended_path(s.t, s.x.u, s.i, s.x.k, s.x.nee))
+    y, J = shift_walk(s.t, x, s.j)
+    measured, same = turned(s, x, y)
+    kept = np.flatnonzero(same & (J > 0))[:CONFIGURATIONS]
+    return Reconnected(columns(s, kept), take(x, kept), take(y, kept), measured[kept])
 
 
-def measured(x, y, z, n) -> float:
-    """Move the direction at x, meet the plane again, and see how the direction at y moves: a determinant."""
-    tangents_x, tangents_y = (np.linalg.svd((z - p)[None])[2][1:] for p in (x, y))
-    w = (z - x) / np.linalg.norm(z - x)
-    columns = []
-    for t in tangents_x:
+def columns(s: Shifts, k: Array) -> Shifts:
+    return Shifts(s.t, take(s.x, k), s.i[k], take(s.y, k), s.j[k], s.J[k])
+
+
+def turned(s: Shifts, x: Walk, y: Walk) -> tuple[Array, Array]:
+    """|det dw_y / dw_x| (N,) in tangents of both directions, and where every turned ray met x_c's primitive."""
+    n = np.arange(len(x.c))
+    at_x, at_y, z = (each[c, :, n].T for each, c in ((x.x.x, x.c - 1), (y.x.x, x.c - 1), (x.x.x, x.c)))
+    r_x, r_y, w = norm(z - at_x), norm(z - at_y), normalize(z - at_x)
+    cosines = np.minimum(x.of.cos[x.c, n], y.of.cos[x.c, n])
+    h = STEP * np.minimum(r_x, r_y) / r_x * cosines**2
+    across_x, across_y = tangents(w), tangents(normalize(z - at_y))
+    d, same = len(z), np.ones(len(n), dtype=bool)
+    matrix = np.empty((len(n), d - 1, d - 1))
+    for k in range(d - 1):
         ends = []
         for sign in (1, -1):
-            turned = w + sign * H * t
-            met = x + turned * ((z - x) @ n) / (turned @ n)
-            ends.append((met - y) / np.linalg.norm(met - y))
-        columns.append(tangents_y @ (ends[0] - ends[1]) / (2 * H))
-    return float(abs(np.linalg.det(np.array(columns))))
+            ray = normalize(w + sign * h * across_x[k])
+            t, prim = s.t.scene.intersect(at_x, ray)
+            same &= prim == x.x.prim[x.c, n]
+            ends.append(normalize(at_x + np.where(same, t, r_x) * ray - at_y))
+        matrix[:, :, k] = np.einsum("kdn,dn->nk", across_y, (ends[0] - ends[1]) / (2 * h))
+    return np.abs(np.linalg.det(matrix)), same
+
+
+def tangents(w: Array) -> Array:
+    """d - 1 orthonormal directions across each w (d, N), (d-1, d, N)."""
+    return np.moveaxis(np.linalg.svd(w.T[:, None])[2][:, 1:], 0, -1)
+
+
+def at_connection(J: Array, c: Array) -> Array:
+    """The entries of (K, N) that belong to the connections."""
+    return J[c, np.arange(len(c))]
+
+
+def in_directions(r: Reconnected, J: Array) -> Array:
+    """dw_y / dw_x = du_y / du_x times p_x / p_y from x_(c-1) on, for du = p dw on either side.  [GRIS Eq. 54]"""
+    on = np.arange(len(r.x.x.x))[:, None] >= r.x.c - 1
+    p_x, p_y = (np.where(on, each.of.p, 1).prod(axis=0) for each in (r.x, r.y))
+    return np.asarray(J * ratio(p_x, p_y))
+
+
+JACOBIANS: dict[str, Callable[[Reconnected], Array]] = {
+    "over directions": lambda r: at_connection(reconnection_jacobian(r.s.t.scene.space.d, r.x.of, r.y.of), r.x.c),
+    "of the shift": lambda r: in_directions(r, r.s.J),
+}
+
+
+def errors(name: str, J: Callable[[Reconnected], Array]) -> Array:
+    """|J / finite difference - 1|, one per configuration."""
+    r = reconnected(name)
+    assert len(r.measured) == CONFIGURATIONS
+    return np.abs(J(r) / r.measured - 1)
+
+
+@pytest.mark.parametrize("name", ["plane", "solid"])
+def test_configurations_reconnect_on_flat_walls_and_on_a_round_ball(name) -> None:
+    r = reconnected(name)
+    assert set(at_connection(r.x.x.prim, r.x.c) >= r.s.t.scene.S) == {False, True}
 
 
 @pytest.mark.claims("GRIS-E52")
+@pytest.mark.claims("GRIS-E52", part="a room of triangles", world="tracer3d")
 @every_dimension
-def test_the_reconnection_jacobian_is_that_of_finite_differences(d) -> None:
-    errors = [abs(formula(*geometry(d, k), d - 1) / measured(*geometry(d, k)) - 1) for k in range(200)]
-    assert max(errors) < 1e-5
+@pytest.mark.parametrize("J", JACOBIANS)
+def test_the_reconnection_jacobian_is_that_of_finite_differences(J, name) -> None:
+    assert errors(name, JACOBIANS[J]).max() < 1e-5
+
+
+def wrong_shift(bug: str) -> Callable[[Reconnected], Array]:
+    """The Jacobian of a wrong shift of the same paths."""
+
+    def J(r: Reconnected) -> Array:
+        of = WRONG_SHIFTS[bug].wrong(r.s.t)
+        assert isinstance(of, PathIntegrals)
+        return in_directions(r, of.shift(r.s.x, r.s.i, Pixels(of, r.s.j)).J)
+
+    return J
+
+
+WRONG: dict[str, Callable[[Reconnected], Array]] = {
+    "power d over directions": lambda r: at_connection(
+        reconnection_jacobian(r.s.t.scene.space.d + 1, r.x.of, r.y.of), r.x.c
+    ),
+    "x and y swapped over directions": lambda r: at_connection(
+        reconnection_jacobian(r.s.t.scene.space.d, r.y.of, r.x.of), r.x.c
+    ),
+    "another power in the shift": wrong_shift("distance to the power of another dimension"),
+    "inverted shift": wrong_shift("inverted path Jacobian"),
+    "distances swapped in the shift": wrong_shift("distances swapped"),
+}
+"""Among them r^2 in flatland."""
 
 
 @pytest.mark.claims("GRIS-E52")
+@pytest.mark.claims("GRIS-E52", part="a room of triangles", world="tracer3d")
 @every_dimension
-def test_a_wrong_power_of_the_distance_or_swapped_ends_are_caught(d) -> None:
-    """Among them r^2 in flatland, which is off by more than 3 somewhere."""
-    wrong = [formula(*geometry(d, k), d) / measured(*geometry(d, k)) for k in range(200)]
-    assert max(np.maximum(wrong, 1 / np.array(wrong))) > 2
-    swapped = [1 / formula(*geometry(d, k), d - 1) / measured(*geometry(d, k)) for k in range(200)]
-    assert np.median(np.abs(np.log(swapped))) > 0.1
+@pytest.mark.parametrize("mistake", WRONG)
+def test_a_wrong_power_of_the_distance_or_swapped_ends_are_caught(mistake, name) -> None:
+    assert np.median(errors(name, WRONG[mistake])) > 1e-3
