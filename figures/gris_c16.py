@@ -106,12 +106,12 @@ FIGURE = Figure(
     conditions=(
         Conditions(
             ("GRIS-C16",),
-            "[GRIS 10.1]",
-            Setup("real time", "still", "indirect", "a"),
-            Setup("real time", "still", "all", "b"),
-            "being moved",
+            "[GRIS 10.1], which names no loop; screen-space reuse, sharp caustics",
+            Setup("real time", "still", "all", "light that few samples find"),
+            Setup("real time", "still", "all", "window mirrored by a small segment (FS9); first and twentieth frame"),
         ),
     ),
+    arm="method",
     presets={"quick": {"replicas": 64, "trees": 1280}, "paper": {"replicas": 256, "trees": 5120}},
     chunks=chunks,
     compute=compute,

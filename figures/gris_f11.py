@@ -116,8 +116,11 @@ def draw(a: Arrays) -> "Picture":
             axis.loglog(T, curve, label=f"path tracing, {name}")
         for method in METHODS[1:]:
             axis.loglog(T, [errors(a, scene, offline.after(a, scene, method, int(t))).mean() for t in T], label=method)
+        axis.set_xticks([], minor=True)
+        axis.set_xticks(T, T)
         axis.set(xlabel="frames T in the mean", ylabel="relMSE of the mean", title=title)
-        axis.legend(fontsize=6.5)
+        axis.set_ylim(bottom=axis.get_ylim()[0] / 4)
+        axis.legend(fontsize=6.5, loc="lower left")
     by_pixel(a, axes[0, 2])
     return picture
 
@@ -133,7 +136,8 @@ def by_pixel(a: Arrays, axis: Any) -> None:
         error = ((images / truth - 1) ** 2).mean(axis=0).reshape(-1, 16).mean(axis=1)
         axis.semilogy(np.arange(len(error)) * 16 + 8, error, label=name)
     axis.set(xlabel="pixel of the film", ylabel="relative squared error", title="One frame, rough boxes")
-    axis.legend(fontsize=6.5)
+    axis.set_ylim(top=2)
+    axis.legend(fontsize=6.5, loc="upper left")
 
 
 FIGURE = Figure(
@@ -158,8 +162,8 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"path tracing": 288, "cornell": 64, "glossy_cornell": 32, "truth": 1},
-        "paper": {"path tracing": 1152, "cornell": 256, "glossy_cornell": 128, "truth": 8},
+        "quick": {"path tracing": 288, "cornell": 128, "glossy_cornell": 32, "truth": 1},
+        "paper": {"path tracing": 1152, "cornell": 512, "glossy_cornell": 128, "truth": 4},
     },
     chunks=chunks,
     compute=compute,

@@ -1,18 +1,19 @@
 """GRIS Fig. 15, columns 2 and 3: ReSTIR DI takes most of the noise out of direct light, and leaves the indirect noise.
 
 Sixty-four lamps behind slats.  One path tree per pixel and frame, whose direct light is replaced by ReSTIR DI
-with 32 candidates, history and three neighbours, its weights 1/Z with visibility; the last frame of a run is shown.
-Direct light alone has an exact reference, radiosity's first bounce.  Against it, ReSTIR DI is also run with
+with 32 candidates, history and three neighbours, its weights 1/Z with visibility; the last frame of a moving camera
+is shown.  Direct light alone has an exact reference, radiosity's first bounce.  Against it, ReSTIR DI is also run with
 weights 1/M, which are not to be trusted where shadows end.
 """
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from figures import criteria, style
+from figures import criteria, realtime, style
 from figures.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.flatland import means, samples_of_equal_cost, view
 from figures.references import reference
@@ -28,7 +29,14 @@ from restir_ref.mis import Weights
 from restir_ref.restir import shade
 from restir_ref.transport.counting import rays
 from restir_ref.transport.paths import RECONNECTION, Tracer, Tree, first_hit, leaves, trace
-from restir_ref.transport.restir_di import BIASED, DEBIASED, LightIntegrals, direct_light, indirect_light
+from restir_ref.transport.restir_di import (
+    BIASED,
+    DEBIASED,
+    LightIntegrals,
+    direct_light,
+    indirect_light,
+    light_integrals,
+)
 from restir_ref.transport.scene import Scene
 
 if TYPE_CHECKING:
@@ -64,26 +72,36 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     images = np.stack([[everything - rest, ours], [everything, ours + rest]]).mean(axis=2)
     _, dark, _ = last_frame(preset, BIASED, Live(rng))
     shape = (preset["replicas"], -1)
-    return {"images": images.reshape(2, 2, *shape), "biased": dark.mean(axis=0).reshape(shape), "rays": rays_of_both}
+    found = {"images": images.reshape(2, 2, *shape), "biased": dark.mean(axis=0).reshape(shape)}
+    return {name: realtime.inset(each) for name, each in found.items()} | {"rays": rays_of_both}
 
 
 def last_frame(preset: Any, mis: Weights, chance: Chance) -> tuple[Tree, Array, Array]:
-    """The trees of the last frame of a run, their direct light by ReSTIR DI (C, N), and rays per pixel of both (2,)."""
+    """Of a moving camera's last frame: trees, their direct light by ReSTIR DI (C, N), rays per pixel of both (2,)."""
     asked = Counter[str]()
-    paths = view(SCENE, RECONNECTION, asked)
-    t, index = paths.tracer, np.arange(preset["replicas"] * paths.n)
+    views = [view(SCENE, RECONNECTION, asked, each) for each in realtime.widened(SCENE)[-preset["frames"] :]]
+    n, index = views[0].n, np.arange(preset["replicas"] * views[0].n)
     history: Reservoirs | None = None
     before: list[Pixels] = []
-    for _ in range(preset["frames"]):
-        start = rays(asked)
-        tree = trace(t, chance.uniform((t.D, len(index))), index % paths.n)
-        traced = rays(asked)
-        of = LightIntegrals(t.scene, paths.n, tree.x[0], tree.T[0])
-        here = Pixels(of, index)
-        near = random_in_row(of, index, REAL_TIME.neighbours, REAL_TIME.radius, chance)
-        X = direct_light(here, near, mis, chance, history, before)
-        history, before = X, [here]
-    return tree, shade(X, here), np.array([traced - start, rays(asked) - traced]) / len(index)
+    for paths, following in pairwise(views):
+        t = paths.tracer
+        of = light_integrals(t, chance.uniform((t.D, len(index))), index % n)
+        history = one_frame(of, index, mis, chance, history, before)
+        before = [Pixels(of, index - index % n + realtime.motion_vectors(following, paths)[index % n])]
+    t, start = views[-1].tracer, rays(asked)
+    tree = trace(t, chance.uniform((t.D, len(index))), index % n)
+    traced, of = rays(asked), LightIntegrals(t.scene, n, tree.x[0], tree.T[0])
+    shown = shade(one_frame(of, index, mis, chance, history, before), Pixels(of, index))
+    of_tree, of_light = (traced - start) / len(index), (rays(asked) - traced) / len(index) + realtime.MOTION_RAYS
+    return tree, shown, np.array([of_tree, of_light])
+
+
+def one_frame(
+    of: LightIntegrals, index: Array, mis: Weights, chance: Chance, history: Reservoirs | None, before: Sequence[Pixels]
+) -> Reservoirs:
+    """Direct light with the neighbours of the real-time preset."""
+    near = random_in_row(of, index, REAL_TIME.neighbours, REAL_TIME.radius, chance)
+    return direct_light(Pixels(of, index), near, mis, chance, history, before)
 
 
 def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
@@ -111,12 +129,18 @@ def check(a: Arrays) -> list[Claim]:
     T = samples_of_equal_cost(float(a["rays"][1]) + 1, RAYS_OF_DIRECT_LIGHT)
     averaged = mape(means(a["images"][0, 0], T), a["reference"][0]).mean()
     reason = (
-        f"Frame against frame, as in the paper.  ReSTIR DI traces {a['rays'][1]:.0f} shadow rays per pixel, a tree "
+        f"Frame against frame, as in the paper.  ReSTIR DI traces {a['rays'][1]:.0f} rays per pixel, a tree "
         f"{a['rays'][0]:.1f} rays; to the mean of {T} samples of direct light, which cost the same, the ratio is "
         f"{direct[1].mean() / averaged:.2f}."
     )
     return [
-        Claim("GRIS-F15di", criteria.ratio_below(direct[1], direct[0], 0.4), "MAPE of direct light", reason=reason),
+        Claim(
+            "GRIS-F15di",
+            criteria.ratio_below(direct[1], direct[0], 0.4),
+            "MAPE of direct light",
+            counter=criteria.ratio_above(direct[1], direct[0], 1),
+            reason=reason,
+        ),
         Claim("GRIS-F15di", criteria.above(ratios[1] / ratios[0], 1), "MAPE ratio, whole image / direct light"),
         *check_means(a),
     ]
@@ -200,20 +224,15 @@ FIGURE = Figure(
     conditions=(
         Conditions(
             ("GRIS-F15di",),
-            "[GRIS Fig. 15]",
-            Setup("real time", "moving", "direct by ReSTIR DI", "a"),
-            Setup("real time", "still", "direct by ReSTIR DI", "b"),
-            "being moved",
+            "[GRIS Fig. 15; 9.3]",
+            Setup("real time", "moving", "direct by ReSTIR DI", "large scenes, with and without ReSTIR DI"),
+            Setup("real time", "moving", "direct by ReSTIR DI", "floor below 64 lamps behind slats (FS15)"),
         ),
         Conditions(
-            (
-                "COM-B04",
-                "COM-B08",
-            ),
-            "[GRIS 9.3]",
-            Setup("real time", "still", "direct by ReSTIR DI", "b"),
-            Setup("real time", "still", "direct by ReSTIR DI", "b"),
-            "",
+            ("COM-B04", "COM-B08"),
+            "baselines, not tied to a figure",
+            Setup("real time", "moving", "direct by ReSTIR DI", "light of many lamps"),
+            Setup("real time", "moving", "direct by ReSTIR DI", "floor below 64 lamps behind slats (FS15)"),
         ),
     ),
     presets={

@@ -167,16 +167,16 @@ def check(a: Arrays) -> list[Claim]:
 
     def larger(caps: Array, without: Array, mutated: Array) -> tuple[criteria.Outcome, str]:
         best, other = (int(caps[error.argmin()]) for error in (without, mutated))
-        return criteria.above(other / best, 1), f"best M_c with 5 mutations ({other}) / without ({best})"
+        return criteria.above(other / best, 1), f"The best cap is {best} without mutations and {other} with 5."
 
     real, exact = larger(a["caps"], none.mean(axis=-1), five.mean(axis=-1)), larger(a["ring_caps"], still, moved)
     return [
         Claim("MCMC-P04", criteria.below(image["right"], 1e-10), "w_bn = 0: exact bias of the image, frame 20"),
         Claim("MCMC-P04", criteria.above(image["$w_{bn}$ = 1"], 0.01), "w_bn = 1: exact bias of the image, frame 20"),
         Claim("MCMC-P04", criteria.below(abs(a["bias"][-1, 0, 0]).max(), 1e-10), "w_bn = 1: own pixels before reuse"),
-        Claim("MCMC-C09", real[0], f"64 pixels: {real[1]}"),
+        Claim("MCMC-C09", real[0], "64 pixels: best M_c with 5 mutations / without", reason=real[1]),
         Claim("MCMC-C09", criteria.ratio_below(five[at], none[at], 0.6), "64 pixels, M_c = 50: 5 / 0 mutations"),
-        Claim("MCMC-C09", exact[0], f"ring of 8, exact: {exact[1]}"),
+        Claim("MCMC-C09", exact[0], "ring of 8, exact: best M_c with 5 mutations / without", reason=exact[1]),
         Claim("MCMC-C09", criteria.below(moved[ring_at] / still[ring_at], 0.6), "ring of 8, M_c = 50: exact ratio"),
     ]
 
@@ -215,6 +215,7 @@ FIGURE = Figure(
         "quick": {**CAPS, "ring_caps": [1, 2, 5, 10, 20, 50], "frames": 400, "replicas": 32},
         "paper": {**CAPS, "ring_caps": [1, 2, 5, 10, 20, 50, 100, 200], "frames": 3000, "replicas": 64},
     },
+    arm="k",
     chunks=chunks,
     compute=compute,
     combine=combine,

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,18 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 )
 
 
+LOOKS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "path tracing": {"color": "#E69F00", "ls": "-."},
+        "ReSTIR GI": {"color": "#56B4E9", "ls": (0, (5, 1, 1, 1, 1, 1))},
+        "reconnection": {"color": "#D55E00", "ls": "--"},
+        "no distance test": {"color": "#000000", "ls": ":"},
+        "hybrid": {"color": "#0072B2", "ls": "-"},
+    }
+)
+"""Lines of the methods in pictures."""
+
+
 def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
     """The last frame of a moving camera, (replicas, n), and its rays per pixel; the scene's inset unless told."""
     asked = Counter[str]()
@@ -104,12 +117,16 @@ def motion_vectors(of: Traced, before: Traced) -> Array:
 
 
 def widened(scene: str, sensor: Pinhole | None = None) -> list[Pinhole]:
-    """The sensors of a camera that moves sideways and arrives at the inset, MARGIN pixels wider on both sides."""
+    """The sensors of a camera that arrives at the scene's inset unless told, MARGIN pixels wider on both sides."""
     last = sensor or SCENES[scene]().pinhole()
-    wide = replace(last, n=last.n + 2 * MARGIN, first=last.first - MARGIN)
+    return sideways(replace(last, n=last.n + 2 * MARGIN, first=last.first - MARGIN))
+
+
+def sideways(last: Pinhole) -> list[Pinhole]:
+    """The sensors of a camera that moves sideways by STEP per frame, FRAMES in all."""
     forward = np.subtract(last.towards, last.eye) / np.linalg.norm(np.subtract(last.towards, last.eye))
     side = STEP * np.array([forward[1], -forward[0]])
-    return [displaced(wide, (k - FRAMES + 1) * side) for k in range(FRAMES)]
+    return [displaced(last, (k - FRAMES + 1) * side) for k in range(FRAMES)]
 
 
 def displaced(sensor: Pinhole, by: Array) -> Pinhole:

@@ -14,7 +14,7 @@ from restir_ref.oracle.scenes import keep, offset
 from restir_ref.resampling import LARGEST_CONFIDENCE
 from restir_ref.restir import capped, initial, spatial, temporal
 from tests.core.stubs import Always, live
-from toy1d import overlapping_supports, two_pixels
+from toy1d import image_of_64, overlapping_supports, two_pixels
 
 every_weight = pytest.mark.parametrize("mis", WEIGHTS.values(), ids=WEIGHTS)
 every_cap = pytest.mark.parametrize("cap", [0.5, 1, 5, 20, np.inf])
@@ -103,9 +103,9 @@ def test_saturated_confidences_stay_where_they_are():
 # ---------------------------------------------------------------- the cap
 
 
-def share_of_history(mis, cap):
+def share_of_history(mis, cap, toy):
     """Relative weight of an old sample of confidence 1000 beside a new one: same target, identity shift."""
-    toy, index = two_pixels(), np.arange(50)
+    index = np.arange(50)
     here, chance = Pixels(toy, index), Always()
     X, Y = (
         Reservoirs(x, 1 / target(here, x), np.full(50, c))
@@ -120,8 +120,9 @@ def share_of_history(mis, cap):
 @pytest.mark.claims("GRIS-A04")
 @every_weight
 @pytest.mark.parametrize("cap", [0.5, 1, 5, 20, 999])
-def test_a_capped_history_weighs_at_most_M_c_over_M_c_plus_one(mis, cap):
-    share = share_of_history(mis, cap)
+@pytest.mark.parametrize("toy", [two_pixels(), image_of_64()], ids=["T2", "T64"])
+def test_a_capped_history_weighs_at_most_M_c_over_M_c_plus_one(mis, cap, toy):
+    share = share_of_history(mis, cap, toy)
     assert (share <= cap / (cap + 1) * (1 + 1e-12)).all()
     if mis is not WEIGHTS["defensive"]:
         assert share == pytest.approx(cap / (cap + 1), rel=1e-12)
@@ -130,7 +131,7 @@ def test_a_capped_history_weighs_at_most_M_c_over_M_c_plus_one(mis, cap):
 @pytest.mark.kernel
 @every_weight
 def test_an_uncapped_history_weighs_more(mis):
-    assert (share_of_history(mis, np.inf) > 20 / 21).all()
+    assert (share_of_history(mis, np.inf, two_pixels()) > 20 / 21).all()
 
 
 @pytest.mark.kernel

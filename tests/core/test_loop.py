@@ -46,7 +46,7 @@ def discrepancy_of_neighbours(around: Around) -> float:
     return float(star_discrepancy(u).mean())
 
 
-@pytest.mark.claims("GRIS-A07", part="values of the preset")
+@pytest.mark.claims("GRIS-A07")
 def test_the_real_time_preset_is_the_papers():
     reuse = {"rounds": 1, "neighbours": 3, "radius": 20, "cap": 20}
     assert asdict(REAL_TIME) == {"trees": 1, **reuse, "along": "talbot", "across": "defensive"}

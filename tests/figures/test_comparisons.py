@@ -1,4 +1,4 @@
-"""Laws of comparisons: arms share their random numbers, a thing is not compared with itself, conditions are declared."""
+"""Laws of comparisons: arms share random numbers, a thing is not compared with itself, conditions are declared."""
 
 import json
 

@@ -67,7 +67,7 @@ NAN = {
     "all unbiased": criteria.all_unbiased(BLOCKS * [1, np.nan, *[1] * 7], TRUTHS),
     "biased": criteria.biased(np.full(64, np.nan), 1.0, -9, 9),
     "ratio below": criteria.ratio_below(np.full(9, np.nan), np.ones(9), 9),
-    "ratio above": criteria.ratio_above(np.zeros(9), np.zeros(9), -9),
+    "ratio above": criteria.ratio_above(np.zeros(9), np.append(np.zeros(8), np.nan), -9),
 }
 
 

@@ -5,9 +5,21 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from figures.flatland import HYBRID, estimates, film, moving, path_tracing, samples_of_equal_cost, spatial_only, view
+from figures import offline
+from figures.flatland import (
+    HYBRID,
+    POINTS,
+    estimates,
+    film,
+    lattice_tracing,
+    moving,
+    path_tracing,
+    samples_of_equal_cost,
+    spatial_only,
+    view,
+)
 from figures.realtime import MARGIN, METHODS, STEP, costed, inset, widened
-from figures.references import reference
+from figures.references import INDIRECT, reference
 from figures.split_light import IndirectIntegrals, direct_film, without_direct
 from flatland2d import PLANE, SCENES
 from flatland2d.scenes import LAMP, chain, matte, room
@@ -155,3 +167,38 @@ def test_direct_and_indirect_light_make_the_whole_image(name):
 
 def test_direct_light_counted_twice_is_noticed():
     assert not within(both_parts("cornell", PathIntegrals), reference("cornell").mean)
+
+
+# ---------------------------------------------------------------- indirect light, offline
+
+
+def seen_offline(method: offline.Method, scene: str, count: int) -> Array:
+    return offline.render(method, scene, count, np.random.default_rng(2))["images"]
+
+
+COUNTS = {"path tracing": 128, "path reuse": 96, "reconnection": 16, "hybrid": 16}
+
+
+@pytest.mark.parametrize("scene", ["cornell", "clear_coat"])
+@pytest.mark.parametrize("name", offline.METHODS)
+def test_offline_methods_make_indirect_light_of_the_right_brightness(name, scene):
+    assert within(seen_offline(offline.METHODS[name], scene, COUNTS[name]), reference(scene, INDIRECT).mean)
+
+
+def test_direct_light_in_an_offline_image_is_noticed():
+    images = seen_offline(offline.Method(path_tracing(4), 4), "clear_coat", 64)
+    assert not within(images, reference("clear_coat", INDIRECT).mean)
+
+
+def test_rays_from_x_1_to_lights_are_not_charged():
+    """On the lit floor a tree of depth 1 is two rays and one to the lamp."""
+    asked = Counter()
+    assert offline.lit(floor_below_a_lamp(3, asked).tracer, asked, live()) == 1
+
+
+def test_a_lattice_of_trees_has_the_right_mean_and_less_variance_than_as_many_trees():
+    of, pixel, chance = view("cornell", HYBRID, Counter()), np.arange(0, 128, 16), live()
+    index = (pixel + 128 * np.arange(24)[:, None]).ravel()
+    images, trees = (render(of, index, chance).reshape(24, 8) for render in (lattice_tracing(), path_tracing(1)))
+    assert within(images, reference("cornell").mean[pixel])
+    assert images.var(axis=0).mean() < 0.5 * trees.var(axis=0).mean() / POINTS

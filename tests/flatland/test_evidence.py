@@ -12,6 +12,7 @@ from benchmarks.jobs import (
     baselines,
     comparing,
     extremes,
+    indirect_references,
     job,
     means,
     offline,
@@ -31,6 +32,7 @@ from restir_ref.batch import take
 from restir_ref.integrals import Pixels
 from restir_ref.loop import random_in_row
 from restir_ref.transport import shifts as shifts_module
+from restir_ref.transport.paths import radiance
 
 # ---------------------------------------------------------------- the machine
 
@@ -360,6 +362,25 @@ def test_techniques_agree_at_a_tiny_count_and_a_wrong_one_does_not(monkeypatch) 
     wrong = {**tracing_job.TECHNIQUES, "light samples alone": lambda *of: tracing_job.by_lights(*of) * 1.1}
     monkeypatch.setattr(tracing_job, "TECHNIQUES", wrong)
     assert not all(row.holds for row in said())
+
+
+@pytest.mark.parametrize("scene", ["crease", "cornell"])
+def test_indirect_light_is_found_another_way_and_a_leaf_too_many_is_seen(monkeypatch, scene) -> None:
+    """A mistake: all leaves."""
+    monkeypatch.setattr(indirect_references, "PANELS", (30, 60))
+    monkeypatch.setattr(indirect_references, "FILM", 4)
+    monkeypatch.setattr(indirect_references, "LATTICES", 4)
+    monkeypatch.setattr(indirect_references, "QUADRATURE", ((256, 4), (512, 8)))
+    monkeypatch.setattr(references, "SIGMA", 10.0)  # t of 3 degrees of freedom: false alarm .2%
+    monkeypatch.setattr(references, "EPS", 0.02)
+    monkeypatch.setattr(references, "SPREAD", 4.0)
+
+    def holds() -> bool:
+        return rows(indirect_references.JOB, 0.001, scene)[-1].holds
+
+    assert holds()
+    monkeypatch.setattr(indirect_references, "indirect_light", radiance)
+    assert not holds()
 
 
 @pytest.mark.usefixtures("few")

@@ -214,7 +214,8 @@ def path_traced(scene: str) -> Array:
     return traced(scene, BATCHES[scene], seed=2)
 
 
-@pytest.mark.claims("GRIS-E49", "COM-A01", "COM-B01")
+@pytest.mark.claims("GRIS-E49", part="all-Lambert scenes against radiosity")
+@pytest.mark.claims("COM-A01", "COM-B01")
 @pytest.mark.parametrize("scene", BATCHES)
 def test_path_tracing_agrees_with_radiosity(scene) -> None:
     assert SCENES[scene]().depth == 3
@@ -226,7 +227,8 @@ def test_path_tracing_tells_radiosity_by_middles_apart(monkeypatch) -> None:
     assert abs(z_score(path_traced("crease"), rendered(SCENES["crease"](), PANELS).mean(), EPS)) > 8
 
 
-@pytest.mark.claims("GRIS-E49", "COM-B01")
+@pytest.mark.claims("GRIS-E49", part="furnace")
+@pytest.mark.claims("COM-A01", "COM-B01")
 def test_a_furnace_traces_its_closed_form() -> None:
     truth = truncated_furnace(SCENES["furnace"]().depth)
     assert abs(z_score(traced("furnace", 16, seed=1), truth, EPS)) < 4

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.jobs.indirect_references import direct
 from benchmarks.jobs.references import has_radiosity, moved
 from figures import references
 from figures.errors import FigureError
-from figures.references import Reference, fingerprint, reference, save
+from figures.flatland import TEN
+from figures.references import INDIRECT, Reference, fingerprint, key_of, reference, save
 from flatland2d import SCENES
 from flatland2d.radiosity import render
 from flatland2d.scenes import INSET
@@ -60,6 +62,29 @@ def test_radiosity_is_the_reference_where_it_applies(scene) -> None:
     assert found.samples == 0
     image = render(setting.scene, setting.pinhole(), setting.depth, per_segment=30, film=4)
     assert image.mean() == pytest.approx(found.mean.mean(), rel=0.002)
+
+
+# ---------------------------------------------------------------- indirect light
+
+
+def unlike_all_light(scene: str, indirect) -> float:
+    """Largest difference of a pixel of indirect light and direct light by quadrature from all light, over its mean."""
+    truth = reference(scene).mean
+    return float(np.abs(indirect + direct(SCENES[scene](), 512, 8) - truth).max() / truth.mean())
+
+
+@pytest.mark.parametrize("scene", TEN)
+def test_indirect_light_and_direct_light_by_quadrature_are_all_light(scene) -> None:
+    found = reference(scene, INDIRECT)
+    assert (found.mean > 0).all()
+    assert found.image_error < 1e-3 * found.mean.mean()
+    assert unlike_all_light(scene, found.mean) < 0.02
+
+
+@pytest.mark.parametrize("scene", [scene for scene in TEN if scene not in ("ajar", "glass_disc")])
+def test_direct_light_that_is_counted_twice_is_noticed(scene) -> None:
+    """A mistake; behind the door and below the disc no light is direct."""
+    assert unlike_all_light(scene, reference(scene).mean) > 0.2
 
 
 # ---------------------------------------------------------------- never a stale one
@@ -119,6 +144,15 @@ def test_what_is_stored_comes_back_and_the_better_reference_stays(tmp_path) -> N
     assert reference("ajar", path=path).error[0] == 0.2
     assert reference("cornell", path=path).image_error == 0.1
     assert reference("cornell", path=path).how == "by hand"
+
+
+def test_references_of_both_lights_are_apart(tmp_path) -> None:
+    path = tmp_path / "references.npz"
+    save({"cornell": some(0.1), key_of("cornell", INDIRECT): some(0.3)}, path)
+    assert reference("cornell", path=path).image_error == 0.1
+    assert reference("cornell", INDIRECT, path).image_error == 0.3
+    with pytest.raises(FigureError, match=r"no reference of the scene 'ajar', indirect.*'indirect references'"):
+        reference("ajar", INDIRECT, path)
 
 
 def test_a_missing_reference_and_a_damaged_file_are_told_apart(tmp_path) -> None:

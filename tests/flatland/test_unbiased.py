@@ -213,7 +213,7 @@ def some_frames(count: int) -> Paired:
     return offline("cornell", "hybrid", 16, count, Live(np.random.default_rng(31)), SMALL)
 
 
-@pytest.mark.claims("GRIS-A06", "GRIS-C09")
+@pytest.mark.claims("GRIS-A06", "GRIS-C09", part="a smaller preset, on a coarse film")
 def test_averages_of_offline_frames_are_unbiased_and_converge() -> None:
     found = some_frames(1024)
     assert bias(found.added, found.initial).is_none(0.005)

@@ -173,14 +173,14 @@ def over_bounds(scene: Scene, c: Array, mis: Weights, passes: int) -> Program[Ar
     return program
 
 
-@pytest.mark.claims("GRIS-TA4", "GRIS-E40")
+@pytest.mark.claims("GRIS-TA4", "GRIS-E40", part="random finite cells")
 @every_robust_weight
 @given(scene=scenes(), c=confidences, passes=st.integers(1, 3))
 def test_no_weight_and_no_sum_of_weights_exceeds_its_bound_after_any_pass(mis, scene, c, passes) -> None:
     assert bounds.largest(over_bounds(scene, c, mis, passes), 2).max() <= 1 + 1e-12
 
 
-@pytest.mark.claims("GRIS-E40")
+@pytest.mark.claims("GRIS-E40", part="finite cells, control")
 @pytest.mark.parametrize("name", [name for name in WEIGHTS if name not in ROBUST])
 def test_weights_without_a_bound_exceed_the_realised_one_of_the_sum(name) -> None:
     exceeded = [

@@ -160,6 +160,25 @@ def test_a_target_that_its_sampler_never_reaches_keeps_its_distance_from_it() ->
     assert far[1] > 0.5 * far[0]
 
 
+def blind_to_ends() -> Frame:
+    """T7, but targets and shifts of the others ignore where their domains end, beyond which no sample lands."""
+    line, frame = overlapping_supports(), quotient(overlapping_supports(), 42)
+    edges = np.linspace(line.low.min(), line.high.max(), 43)
+    p_hat = line.f(np.arange(7)[:, None], (edges[1:] + edges[:-1]) / 2)
+    p_hat[CENTRE] = frame.cells.p_hat[CENTRE]
+    return Frame(replace(frame.cells, p_hat=p_hat, shifts=np.broadcast_to(np.arange(42), (7, 7, 42))), 7)
+
+
+@pytest.mark.claims("GRIS-A15")
+def test_neighbours_whose_targets_ignore_the_ends_of_their_domains_make_the_centre_of_seven_pixels_dark() -> None:
+    right, wrong = (expected_at_centre(frame, 1.0) for frame in (quotient(overlapping_supports(), 42), blind_to_ends()))
+    cells = quotient(overlapping_supports(), 42).cells
+    truth = (cells.f * cells.v)[CENTRE]
+    assert right == pytest.approx(truth, rel=1e-12)
+    assert (wrong <= truth * (1 + 1e-12)).all()
+    assert wrong.sum() < 0.9 * truth.sum()
+
+
 # ---------------------------------------------------------------- contribution weights
 
 

@@ -22,7 +22,7 @@ from toy1d import image_of_64
 from toy1d.walking import walking
 
 FRAMES = (1, 2, 5, 20)
-REPLICAS = 64 * 60
+REPLICAS = 64 * 50
 
 Around = Callable[[Pixels, Reservoirs, Chance], Sequence[Pixels]]
 Mutation = Callable[[Reservoirs, Pixels, Chance], Reservoirs]

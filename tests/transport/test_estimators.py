@@ -85,28 +85,29 @@ def estimates(scene: str, depth: int, technique: str) -> Array:
     return samples(matte(scene, depth), ESTIMATORS[technique], BATCHES[technique], seed=51)
 
 
-@pytest.mark.claims("GRIS-E49", "COM-B01")
+@pytest.mark.claims("GRIS-E49", part="all-Lambert scenes against radiosity")
+@pytest.mark.claims("COM-B01")
 @pytest.mark.parametrize("technique", ["both", "BSDF"])
 @pytest.mark.parametrize(("scene", "depth"), PANELS)
 def test_with_and_without_light_sampling_path_tracing_is_radiosity(scene, depth, technique) -> None:
     assert abs(z_score(estimates(scene, depth, technique), truth(scene, depth), 0.003)) < 4
 
 
-@pytest.mark.claims("GRIS-E49")
+@pytest.mark.claims("GRIS-E49", part="all-Lambert scenes, technique against technique")
 @pytest.mark.parametrize(("scene", "depth"), PANELS)
 def test_with_and_without_light_sampling_agree(scene, depth) -> None:
     both, bsdf = estimates(scene, depth, "both"), estimates(scene, depth, "BSDF")
     assert abs(z_score(bsdf, both.mean(), 0.003)) < 4
 
 
-@pytest.mark.claims("GRIS-E49")
+@pytest.mark.claims("GRIS-E49", part="furnace")
 def test_in_a_furnace_every_single_path_of_bsdf_samples_is_exact() -> None:
     t, N = matte("furnace", 8), 500
     L = by_bsdf(trace(t, np.random.default_rng(52).random((t.D, N)), np.arange(N) % PIXELS))
     assert np.abs(L - (1 - FURNACE_ALBEDO**9) / (1 - FURNACE_ALBEDO)).max() < 1e-12
 
 
-@pytest.mark.claims("GRIS-E49")
+@pytest.mark.claims("GRIS-E49", part="control without MIS")
 @pytest.mark.parametrize("scene", ["checker", "matte_cornell"])
 def test_without_mis_weights_direct_light_is_counted_twice(scene, monkeypatch) -> None:
     direct = truth(scene, 1)
@@ -116,7 +117,7 @@ def test_without_mis_weights_direct_light_is_counted_twice(scene, monkeypatch) -
     assert doubled.mean() / direct == pytest.approx(2, abs=0.05)
 
 
-@pytest.mark.claims("GRIS-E49")
+@pytest.mark.claims("GRIS-E49", part="light sampling alone")
 def test_each_technique_alone_is_unbiased_without_weights(monkeypatch) -> None:
     unweighted(monkeypatch)
     L = samples(matte("matte_cornell", 2), by_light, BATCHES["light"], seed=54)
