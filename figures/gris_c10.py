@@ -77,15 +77,16 @@ def chunks(preset: Any) -> Sequence[dict[str, Any]]:
 
 
 def compared(preset: Any) -> list[dict[str, Any]]:
-    """One per distance and loop of which there are frames."""
-    return [{"loop": loop, "distance": d} for loop in LOOPS if preset[loop] for d in DISTANCES]
+    """One per distance and part of the frames of a loop."""
+    parts = [(loop, part) for loop in LOOPS for part in range(preset[loop][1])]
+    return [{"loop": loop, "part": part, "distance": d} for loop, part in parts for d in DISTANCES]
 
 
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     """Errors of pixels, (count, n); or how many connections are shorter than the distances."""
     if "loop" in chunk:
         loop = chunk["loop"]
-        return {"error": RENDERED[loop](chunk["distance"], preset[loop], rng, wedge())}
+        return {"error": RENDERED[loop](chunk["distance"], preset[loop][0], rng, wedge())}
     sensor = {COUNTED: wedge(), GAP: SCENES[SCENE]().pinhole()}[chunk["view"]]
     counted = corners.connections(least(0), SCENE, DISTANCES[1:], preset[COUNTED], rng, sensor)
     return counted if chunk["view"] == COUNTED else counted | gap(preset[GAP], sensor, int(rng.integers(2**63)))
@@ -100,8 +101,10 @@ def gap(count: int, sensor: Pinhole, seed: int) -> Arrays:
 def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
     """Errors by "loop.distance", counts and clearances by "wedge.name" and "gap.name"."""
     *errors, counted, beside = results
-    named = zip(compared(preset), errors, strict=True)
-    arrays = {f"{chunk['loop']}.{chunk['distance']:g}": part["error"] for chunk, part in named}
+    parts: dict[str, list[Array]] = {}
+    for chunk, found in zip(compared(preset), errors, strict=True):
+        parts.setdefault(f"{chunk['loop']}.{chunk['distance']:g}", []).append(found["error"])
+    arrays = {name: np.concatenate(each) for name, each in parts.items()}
     arrays |= {f"wedge.{name}": each for name, each in counted.items()}
     arrays |= {f"gap.{name}": each for name, each in beside.items()}
     scene = SCENES[SCENE]()
@@ -227,8 +230,8 @@ FIGURE = Figure(
     ),
     arm="distance",
     presets={
-        "quick": {**dict(zip(LOOPS, (192, 96, 0), strict=True)), COUNTED: 128, GAP: 64},
-        "paper": {**dict(zip(LOOPS, (2048, 512, 1024), strict=True)), COUNTED: 1024, GAP: 512},
+        "quick": {**dict(zip(LOOPS, ([128, 1], [96, 1], [0, 0]), strict=True)), COUNTED: 128, GAP: 64},
+        "paper": {**dict(zip(LOOPS, ([512, 4], [256, 4], [256, 2]), strict=True)), COUNTED: 1024, GAP: 512},
     },
     chunks=chunks,
     compute=compute,

@@ -46,7 +46,7 @@ def chunks(preset: Any) -> Sequence[dict[str, str]]:
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     """Images of one shift; or counts of both, each with the same random numbers."""
     if "loop" in chunk:
-        return RENDERED[chunk["loop"]](chunk["scene"], chunk["shift"], preset[chunk["loop"]], rng)
+        return RENDERED[chunk["loop"]](chunk["scene"], chunk["shift"], preset[chunk["loop"]][chunk["scene"]], rng)
     replicas, seed = preset[chunk["count"]], int(rng.integers(2**63))
     if chunk["count"] == COUNTED:
         return {"differ": np.array([differing(scene, replicas, seed) for scene in TEN])}
@@ -202,6 +202,11 @@ def _rays(axis: "Axes", a: Arrays) -> None:
     axis.legend(loc="upper right")
 
 
+def of_scenes(*counts: int) -> dict[str, int]:
+    """Replicas of each judged scene."""
+    return dict(zip(JUDGED, counts, strict=True))
+
+
 FIGURE = Figure(
     id="GRIS-C12",
     title="What a better shift gains in real time and offline",
@@ -219,8 +224,8 @@ FIGURE = Figure(
     ),
     arm="shift",
     presets={
-        "quick": {"real time": 64, "offline": 48, ONE: 64, COUNTED: 16},
-        "paper": {"real time": 512, "offline": 1024, ONE: 256, COUNTED: 64},
+        "quick": {"real time": of_scenes(128, 24, 96), "offline": of_scenes(64, 24, 64), ONE: 64, COUNTED: 16},
+        "paper": {"real time": of_scenes(512, 96, 512), "offline": of_scenes(384, 96, 384), ONE: 256, COUNTED: 64},
     },
     chunks=chunks,
     compute=compute,

@@ -221,8 +221,8 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"replicas": 10, DIRECT: 10, PT: 160, TRUTH: 10},
-        "paper": {"replicas": 64, DIRECT: 64, PT: 1024, TRUTH: 100},
+        "quick": {"replicas": 8, DIRECT: 8, PT: 128, TRUTH: 4},
+        "paper": {"replicas": 32, DIRECT: 32, PT: 512, TRUTH: 40},
     },
     chunks=chunks,
     compute=compute,

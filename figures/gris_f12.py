@@ -185,8 +185,8 @@ FIGURE = Figure(
     ),
     arm="rule",
     presets={
-        "quick": {"frames": 96, DIRECT: 32, "shifts": 64},
-        "paper": {"frames": 1024, DIRECT: 256, "shifts": 512},
+        "quick": {"frames": 64, DIRECT: 32, "shifts": 64},
+        "paper": {"frames": 512, DIRECT: 128, "shifts": 512},
     },
     chunks=chunks,
     compute=compute,

@@ -149,8 +149,8 @@ FIGURE = Figure(
             DISTANT: {"hybrid": 256, "reconnection": 256},
         },
         "paper": {
-            GLASS: {"hybrid": 256, "reconnection": 512, PT: 2560, DIRECT: 256},
-            DISTANT: {"hybrid": 2048, "reconnection": 2048},
+            GLASS: {"hybrid": 96, "reconnection": 192, PT: 960, DIRECT: 96},
+            DISTANT: {"hybrid": 1024, "reconnection": 1024},
         },
     },
     chunks=chunks,

@@ -66,14 +66,16 @@ def chunks(preset: Any) -> Sequence[Any]:
 
 
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
-    """Images (part, how, run, pixel), direct light by 1/M (run, pixel), rays per pixel of a tree and of ReSTIR DI."""
+    """Images (part, how, run, pixel), rays per pixel of a tree and of ReSTIR DI; in some groups direct light by 1/M."""
     tree, ours, rays_of_both = last_frame(preset, DEBIASED["1/Z"], Live(rng))
     everything, rest = np.asarray(sum(F for _, _, F in leaves(tree))), indirect_light(tree)
     images = np.stack([[everything - rest, ours], [everything, ours + rest]]).mean(axis=2)
-    _, dark, _ = last_frame(preset, BIASED, Live(rng))
     shape = (preset["replicas"], -1)
-    found = {"images": images.reshape(2, 2, *shape), "biased": dark.mean(axis=0).reshape(shape)}
-    return {name: realtime.inset(each) for name, each in found.items()} | {"rays": rays_of_both}
+    found = {"images": realtime.inset(images.reshape(2, 2, *shape)), "rays": rays_of_both}
+    if chunk["group"] >= preset["biased"]:
+        return found
+    _, dark, _ = last_frame(preset, BIASED, Live(rng))
+    return found | {"biased": realtime.inset(dark.mean(axis=0).reshape(shape))}
 
 
 def last_frame(preset: Any, mis: Weights, chance: Chance) -> tuple[Tree, Array, Array]:
@@ -110,7 +112,7 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
     scene, sensor = setting.scene, setting.pinhole()
     return {
         "images": np.concatenate([result["images"] for result in results], axis=2),
-        "biased": np.concatenate([result["biased"] for result in results]),
+        "biased": np.concatenate([result["biased"] for result in results if "biased" in result]),
         "rays": np.mean([result["rays"] for result in results], axis=0),
         "reference": np.stack([render(scene, sensor, 1), reference(SCENE).mean]),
         "edges": shadow_edges(scene, sensor),
@@ -236,8 +238,8 @@ FIGURE = Figure(
         ),
     ),
     presets={
-        "quick": {"groups": 12, "replicas": 32, "frames": 8},
-        "paper": {"groups": 64, "replicas": 32, "frames": 12},
+        "quick": {"groups": 20, "biased": 5, "replicas": 32, "frames": 8},
+        "paper": {"groups": 64, "biased": 16, "replicas": 32, "frames": 12},
     },
     chunks=chunks,
     compute=compute,

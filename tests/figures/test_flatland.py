@@ -5,10 +5,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from figures import offline
+from figures import gris_f14, gris_f17, offline
 from figures.flatland import (
     HYBRID,
     POINTS,
+    TEN,
     estimates,
     film,
     lattice_tracing,
@@ -28,6 +29,7 @@ from restir_ref.batch import Array
 from restir_ref.counting import Counting
 from restir_ref.integrals import Pixels
 from restir_ref.loop import REAL_TIME, random_in_row, spread_in_row
+from restir_ref.metrics import tile_contrast
 from restir_ref.restir import initial, spatial
 from restir_ref.transport.counting import CLOSEST, SHADOW, counted
 from restir_ref.transport.paths import Tracer, radiance, trace
@@ -202,3 +204,40 @@ def test_a_lattice_of_trees_has_the_right_mean_and_less_variance_than_as_many_tr
     images, trees = (render(of, index, chance).reshape(24, 8) for render in (lattice_tracing(), path_tracing(1)))
     assert within(images, reference("cornell").mean[pixel])
     assert images.var(axis=0).mean() < 0.5 * trees.var(axis=0).mean() / POINTS
+
+
+@pytest.mark.parametrize("name", TEN)
+def test_shifts_differ_but_where_all_is_rough_and_nothing_near(name):
+    assert (gris_f17.differing(name, 16, 1) == 0) == (name in gris_f17.ONE_MAP)
+
+
+def test_shifts_that_differ_are_not_taken_for_one_map(monkeypatch):
+    """A mistake: the glossy box among the scenes with one map."""
+    monkeypatch.setattr(gris_f17, "ONE_MAP", (*gris_f17.ONE_MAP, "glossy_cornell"))
+    some = {"images": np.ones((8, 128)), "rays": np.array(1.0)}
+    results = [
+        {chunk["what"]: np.array(float(chunk["scene"] == "glossy_cornell"))} if "what" in chunk else some
+        for chunk in gris_f17.chunks({})
+    ]
+    with pytest.raises(ValueError, match="the same map"):
+        gris_f17.combine({}, results)
+
+
+# ---------------------------------------------------------------- traces of tiles
+
+
+def smooth_errors(tile: int) -> Array:
+    """Errors of 256 images of 128 pixels: one number per tile and noise, or a moving mean of noise without tiles."""
+    rng = np.random.default_rng(1)
+    if tile:
+        return rng.standard_normal((256, 128 // tile)).repeat(tile, axis=1) + 0.3 * rng.standard_normal((256, 128))
+    noise = rng.standard_normal((256, 131))
+    return sum(noise[:, k : k + 128] for k in range(4))
+
+
+def test_ranks_show_tiles_and_a_firefly_beside_a_border_does_not_look_like_one():
+    errors = smooth_errors(0)
+    assert tile_contrast(gris_f14.ranks(smooth_errors(16))) > 0.8
+    errors[7, 32] += 300
+    assert tile_contrast(errors) > 0.3
+    assert abs(tile_contrast(gris_f14.ranks(errors))) < 0.05

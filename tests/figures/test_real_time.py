@@ -7,7 +7,9 @@ import pytest
 
 from figures import corners, gris_c10, gris_c12
 from figures.flatland import HYBRID, TEN, film, moving, view
-from figures.gris_f01 import PIXELS
+from figures.gris_f01 import CAUSTIC, GLOSSY, PIXELS
+from figures.gris_f01 import film as film_of
+from figures.gris_f12 import glossiest
 from figures.indirect import METHODS, darkened
 from figures.realtime import FRAMES, MARGIN, STEP, costed, sideways, widened
 from figures.split_light import without_direct
@@ -32,6 +34,18 @@ def test_a_camera_that_moves_sideways_arrives_where_it_is_told(name):
 def test_whole_films_are_judged_at_pixels_in_equal_steps():
     assert set(np.diff(PIXELS)) == {FILM // 128}
     assert PIXELS[0] == FILM - 1 - PIXELS[-1]
+
+
+def glossy(name) -> bool:
+    """Whether the film shows a surface with a lobe that does not connect."""
+    setting = SCENES[name]()
+    seen = setting.scene.material[gbuffer(setting.scene, film_of(name)).prim]
+    return bool((glossiest(setting.scene.materials)[np.unique(seen)] < HYBRID.roughness).any())
+
+
+def test_restir_gi_is_judged_where_glossy_surfaces_are_seen():
+    assert all(glossy(name) for name in GLOSSY)
+    assert not glossy(CAUSTIC)
 
 
 # ---------------------------------------------------------------- indirect light
