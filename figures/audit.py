@@ -43,6 +43,9 @@ def results(
 
 def remarks(project: Project, entries: Mapping[str, Entry]) -> Iterator[str]:
     """What is told without being amiss."""
-    older = kept.older(kept.read(project.paper), entries)
+    runs = kept.read(project.paper)
+    older, missing = kept.older(runs, entries), kept.missing(runs, entries)
+    if missing:
+        yield f"{len(missing)} figures have no kept paper run yet: {', '.join(missing)}; make figures-paper"
     if older:
         yield f"{len(older)} paper runs were computed by other theory or worlds than today's: {', '.join(older)}"

@@ -141,9 +141,11 @@ def judged(a: Arrays, loop: str, d: float) -> list[Claim]:
     corner, far = pair(a, loop, d, "corner"), pair(a, loop, d, "away")
     more = criteria.ratio_above(*corner, 1)
     fifth = criteria.ratio_below(*corner, 0.8) if len(corner[0]) >= ENOUGH else None
+    beside = criteria.ratio_interval(*pair(a, loop, d, "beside"))[2]
+    but = f"Within 20 pixels of the corner's, which share paths with them, it is {beside}."
     return [
-        Claim("GRIS-C10", criteria.ratio_below(*corner, 1), names["order"], counter=more),
-        Claim("GRIS-C10", fifth, names["fifth"], counter=more, reason="" if fifth else FEW),
+        Claim("GRIS-C10", criteria.ratio_below(*corner, 1), names["order"], counter=more, caveat=but),
+        Claim("GRIS-C10", fifth, names["fifth"], counter=more, reason="" if fifth else FEW, caveat=but),
         Claim("GRIS-C10", criteria.ratio_within(*far, 0.9, 1.1), names["away"]),
     ]
 
@@ -231,7 +233,7 @@ FIGURE = Figure(
     arm="distance",
     presets={
         "quick": {**dict(zip(LOOPS, ([128, 1], [96, 1], [0, 0]), strict=True)), COUNTED: 128, GAP: 64},
-        "paper": {**dict(zip(LOOPS, ([512, 4], [256, 4], [256, 2]), strict=True)), COUNTED: 1024, GAP: 512},
+        "paper": {**dict(zip(LOOPS, ([512, 4], [256, 8], [256, 2]), strict=True)), COUNTED: 1024, GAP: 512},
     },
     chunks=chunks,
     compute=compute,

@@ -77,6 +77,8 @@ def check(a: Arrays) -> list[Claim]:
     glossy = pair(a, GLOSSY, "hybrid", "reconnection", box)
     test = pair(a, GLOSSY, "hybrid", "no distance test", edge)
     rough = criteria.ratio_within(*pair(a, ROUGH, "hybrid", "reconnection", away), 0.8, 1.25)
+    whole = criteria.ratio_interval(*pair(a, ROUGH, "hybrid", "reconnection", np.ones_like(box)))[2]
+    decided = len(test[0]) >= ENOUGH
     claims = [
         Claim(
             "GRIS-F06",
@@ -84,17 +86,23 @@ def check(a: Arrays) -> list[Claim]:
             "glossy box: relMSE, hybrid / reconnection",
             counter=criteria.ratio_above(*glossy, 1),
         ),
-        Claim("GRIS-F06", rough, "rough box, away from its edge: relMSE, hybrid / reconnection"),
         Claim(
             "GRIS-F06",
-            criteria.ratio_below(*test, 0.9),
+            rough,
+            "rough box, away from its edge: relMSE, hybrid / reconnection",
+            caveat=f"Over the whole inset, which is the foot of the box, it is {whole}.",
+        ),
+        Claim(
+            "GRIS-F06",
+            criteria.ratio_below(*test, 0.9) if decided else None,
             "edge of the glossy box: relMSE, with / without distance test",
             counter=criteria.ratio_above(*test, 1),
-            reason=counted(a, GLOSSY),
+            reason=counted(a, GLOSSY) + (EDGE if decided else FEW),
         ),
     ]
     reported = {
         "pixels beside that edge: with / without distance test": (GLOSSY, "no distance test", beside),
+        "edge of the glossy box: hybrid / reconnection": (GLOSSY, "reconnection", edge),
         "rough floor beside the glossy box: hybrid / reconnection": (GLOSSY, "reconnection", ~box),
         "edge of the rough box: hybrid / reconnection, that is with / without distance test": (
             ROUGH,
@@ -106,6 +114,15 @@ def check(a: Arrays) -> list[Claim]:
         found = criteria.ratio_interval(*pair(a, scene, "hybrid", other, mask))[2]
         claims.append(Claim("GRIS-F06", criteria.reported(found), f"relMSE, {part}"))
     return claims
+
+
+ENOUGH = 500
+"""Replicas whose interval of a ratio can be trusted: few bright frames decide it."""
+FEW = " So few replicas do not tell .9 from 1: the paper preset judges."
+EDGE = (
+    " The paper compares with reconnection, whose noise the hybrid shift does lower at this edge (below); what the "
+    "distance test does there by itself is the ledger's clause, and in the plane short connections cost 1/r, not 1/r^2."
+)
 
 
 def counted(a: Arrays, scene: str) -> str:

@@ -192,11 +192,8 @@ def faster(a: Arrays) -> list[Claim]:
         Claim("GRIS-F17", criteria.reported(in_words(each)), f"{method}: speedup scene by scene")
         for method, each in all_of.items()
     ]
-    coat = criteria.below(all_of["path reuse"]["clear_coat"], 1.2)
-    return [
-        *claims,
-        Claim("GRIS-F17", coat, "path reuse: speedup on the clear coat", reason="" if coat.passed else COAT),
-    ]
+    share = f"{float(a['coat']):.0%} of the inset's indirect light leaves the floor by the coat"
+    return [*claims, Claim("GRIS-F17", criteria.reported(share), "clear coat (more in GRIS-F17coat)", reason=INSETS)]
 
 
 def in_words(found: Mapping[str, float]) -> str:
@@ -208,9 +205,10 @@ def in_words(found: Mapping[str, float]) -> str:
     )
 
 
-COAT = (
-    "In the inset {:.0%} of the indirect light leaves the floor by the coat; the rest leaves it by the matte base, "
-    "which gains from reuse what it gains elsewhere. Path reuse does lose where all light comes through the glass disc."
+INSETS = (
+    "These are insets, and those of both Cornell boxes are the corner of floor and box, where 40% of the pixels lie "
+    "within 2% of another surface, 6% on the whole film. Where both shifts lose to path tracing in such an inset, they "
+    "win over the whole film (GRIS-F11a)."
 )
 
 
@@ -228,9 +226,6 @@ def equal_count(a: Arrays) -> list[Claim]:
     return claims
 
 
-SAME = "both shifts are the same map: 0% of shifts differ"
-
-
 def compared(a: Arrays, scene: str, part: str, beside: str) -> Claim:
     """One scene in which the shifts differ; no single one refutes what the paper says to be so generally."""
     pair = shift_errors(a, scene)
@@ -242,9 +237,10 @@ def compared(a: Arrays, scene: str, part: str, beside: str) -> Claim:
 
 CORNER = (
     "All is rough here, and the shifts differ by the least distance of connections only: the inset is the corner of "
-    "floor and box, where hybrid replays what reconnection connects at less than 2% of the scene's size. In the plane "
-    "a short connection costs 1/r, in space 1/r^2, and the other x_2 that replay finds costs more than it saves. On "
-    "the whole film the ratio is nearer to 1 (GRIS-F11a); in a wedge of 40 degrees the distance pays (GRIS-C10)."
+    "floor and box, where hybrid replays what reconnection connects at less than 2% of the scene's size. Over the "
+    "whole film hybrid is a fifth worse (GRIS-F11a). Our explanation: in the plane a short connection costs 1/r, in "
+    "space 1/r^2; in a wedge of 40 degrees the distance pays here too (GRIS-C10). Fig. 18 has no rough Cornell box, "
+    "and says generally."
 )
 
 

@@ -118,12 +118,15 @@ def verdicts(kept: Mapping[str, Kept], declared: Mapping[str, set[str]]) -> dict
 
 
 def stale(kept: Mapping[str, Kept], entries: Mapping[str, Entry]) -> Iterator[str]:
-    """Figures whose paper run is missing or was judged by other code of their own, in words."""
+    """Figures whose paper run was computed or judged by other code of their own, in words."""
     for id_, entry in entries.items():
-        if id_ not in kept:
-            yield f"{id_}: no paper run is kept; make figures-paper ARGS={id_}"
-        elif kept[id_].own != own(entry):
+        if id_ in kept and kept[id_].own != own(entry):
             yield f"{id_}: its code or paper preset has changed since its paper run at {kept[id_].commit}"
+
+
+def missing(kept: Mapping[str, Kept], entries: Mapping[str, Entry]) -> list[str]:
+    """Figures that still have no kept paper run."""
+    return [id_ for id_ in entries if id_ not in kept]
 
 
 def older(kept: Mapping[str, Kept], entries: Mapping[str, Entry]) -> list[str]:

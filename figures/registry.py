@@ -39,6 +39,7 @@ MODULES: tuple[str, ...] = (
     "figures.gris_c10",
     "figures.gris_c09",
     "figures.gris_f17",
+    "figures.gris_f17coat",
     "figures.gris_f13",
     "figures.gris_f12",
     "figures.gris_f11",
