@@ -114,6 +114,8 @@ def prepare(plan: Plan, warn: Callable[[str], object]) -> set[int]:
     """
     _make(plan.folder / "chunks")
     found = {n: store.state(chunk_path(plan, n), chunk_key(plan, n)) for n in range(len(plan.parts))}
+    for path in _left_over(plan):
+        path.unlink()
     for path, trouble in _foreign(plan, found):
         raise FigureError(
             f"{path} is not a part of this run: {trouble}. "
@@ -134,6 +136,13 @@ def _make(folder: Path) -> None:
         disk.sweep(folder)
     except OSError as error:
         raise FigureError(disk.unwritable(folder, error)) from error
+
+
+def _left_over(plan: Plan) -> list[Path]:
+    """Chunks of the same run by older code, which declared more of them."""
+    count, paths = len(plan.parts), sorted((plan.folder / "chunks").glob("*.npz"))
+    extra = [path for path in paths if path.stem.isdigit() and int(path.stem) >= count > 0]
+    return [path for path in extra if store.state(path, chunk_key(plan, 0))[0] == "stale"]
 
 
 def _foreign(plan: Plan, found: Mapping[int, tuple[store.State, str]]) -> Iterator[tuple[Path, str]]:

@@ -19,6 +19,11 @@ def test_a_file_that_differs_in_nothing_but_the_code_is_stale(stored):
     assert store.state(stored, '{"code": "b", "seed": 1}')[0] == "stale"
 
 
+@pytest.mark.parametrize("field", sorted(store.OF_CODE))
+def test_a_file_that_differs_in_what_the_code_decides_is_stale(stored, field):
+    assert store.state(stored, f'{{"code": "b", "{field}": 9, "seed": 1}}')[0] == "stale"
+
+
 def test_a_file_that_also_differs_in_the_seed_is_foreign(stored):
     assert store.state(stored, '{"code": "b", "seed": 2}')[0] == "foreign"
 
