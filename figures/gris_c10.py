@@ -233,7 +233,7 @@ FIGURE = Figure(
     arm="distance",
     presets={
         "quick": {**dict(zip(LOOPS, ([128, 1], [96, 1], [0, 0]), strict=True)), COUNTED: 128, GAP: 64},
-        "paper": {**dict(zip(LOOPS, ([512, 4], [256, 8], [256, 2]), strict=True)), COUNTED: 1024, GAP: 512},
+        "paper": {**dict(zip(LOOPS, ([512, 4], [256, 8], [256, 4]), strict=True)), COUNTED: 1024, GAP: 512},
     },
     chunks=chunks,
     compute=compute,
