@@ -115,7 +115,7 @@ def draw(a: Arrays) -> "Picture":
     for k, (axis, name) in enumerate(zip(axes.ravel(), FLOORS, strict=True)):
         for method in METHODS[:2]:
             axis.loglog(*curve(a, k, method), label=method)
-        axis.set(xlabel="rays per pixel", ylabel="MAPE", title=f"{name}: {speedup(a, k):.2g} times as fast")
+        axis.set(xlabel="rays per pixel", ylabel="MAPE", title=f"{name}: {speedup(a, k):.2g}x")
         axis.legend()
     return picture
 

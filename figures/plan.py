@@ -14,6 +14,8 @@ from figures.jobs import Job
 from figures.registry import Entry
 
 FORMAT = 1
+OF_CODE = frozenset({"code", "data", "chunks", "chunk", "parameters", "stream"})
+"""Fields of a key that the code decides: what differs in nothing else is older, not foreign."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,7 @@ def prepare(plan: Plan, warn: Callable[[str], object]) -> set[int]:
     but the code that made it is computed again.
     """
     _make(plan.folder / "chunks")
-    found = {n: store.state(chunk_path(plan, n), chunk_key(plan, n)) for n in range(len(plan.parts))}
+    found = {n: state_at(chunk_path(plan, n), chunk_key(plan, n)) for n in range(len(plan.parts))}
     for path in _left_over(plan):
         path.unlink()
     for path, trouble in _foreign(plan, found):
@@ -142,11 +144,22 @@ def _left_over(plan: Plan) -> list[Path]:
     """Chunks of the same run by older code, which declared more of them."""
     count, paths = len(plan.parts), sorted((plan.folder / "chunks").glob("*.npz"))
     extra = [path for path in paths if path.stem.isdigit() and int(path.stem) >= count > 0]
-    return [path for path in extra if store.state(path, chunk_key(plan, 0))[0] == "stale"]
+    return [path for path in extra if state_at(path, chunk_key(plan, 0))[0] == "stale"]
+
+
+def state_at(path: Path, key: str) -> tuple[store.State, str]:
+    """What stands at a path, and what is wrong with it; older where the code, or what it decides, was another."""
+    state, trouble = store.state(path, key)
+    if state == "foreign" and path.is_file():
+        found = store.read(path).get(store.KEY)
+        fields = set(store.differing(str(found[0]), key)) if found is not None and found.ndim == 1 else set()
+        if fields and fields <= OF_CODE:
+            return "stale", "other code computed it"
+    return state, trouble
 
 
 def _foreign(plan: Plan, found: Mapping[int, tuple[store.State, str]]) -> Iterator[tuple[Path, str]]:
-    state, trouble = store.state(arrays_path(plan), key(plan))
+    state, trouble = state_at(arrays_path(plan), key(plan))
     if state == "foreign":
         yield arrays_path(plan), trouble
     yield from ((chunk_path(plan, n), trouble) for n, (state, trouble) in found.items() if state == "foreign")

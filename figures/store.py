@@ -26,9 +26,6 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the date of every zip member: bytes must not de
 # What reading a broken zip or array can raise; zlib and struct errors come with a bad header.
 UNREADABLE = (OSError, ValueError, EOFError, KeyError, RuntimeError, MemoryError, BadZipFile, zlib.error)
 
-OF_CODE = frozenset({"code", "data", "chunks", "chunk", "parameters", "stream"})
-"""Fields of a key that the code decides: what differs in nothing else is older, not foreign."""
-
 State = Literal["absent", "ours", "stale", "damaged", "foreign"]
 
 
@@ -96,8 +93,7 @@ def _judged(arrays: Arrays, key: str) -> Stored:
     found = arrays.pop(KEY, np.array([]))
     if found.dtype.kind != "U" or found.shape != (2,):
         return Stored("foreign", {}, "it carries no key, so it was not written by this program")
-    fields = set(differing(str(found[0]), key))
-    if fields and fields <= OF_CODE:
+    if found[0] != key and differing(str(found[0]), key) == ["code"]:
         return Stored("stale", {}, "other code computed it")
     if found[0] != key:
         return Stored("foreign", {}, difference(str(found[0]), key))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from figures import code, store
+from figures import code, plan, store
 
 KEY = '{"code": "a", "seed": 1}'
 
@@ -19,9 +19,14 @@ def test_a_file_that_differs_in_nothing_but_the_code_is_stale(stored):
     assert store.state(stored, '{"code": "b", "seed": 1}')[0] == "stale"
 
 
-@pytest.mark.parametrize("field", sorted(store.OF_CODE))
-def test_a_file_that_differs_in_what_the_code_decides_is_stale(stored, field):
-    assert store.state(stored, f'{{"code": "b", "{field}": 9, "seed": 1}}')[0] == "stale"
+@pytest.mark.parametrize("field", sorted(plan.OF_CODE))
+def test_a_chunk_that_differs_in_what_the_code_decides_is_stale(stored, field):
+    assert plan.state_at(stored, f'{{"code": "b", "{field}": 9, "seed": 1}}')[0] == "stale"
+
+
+@pytest.mark.parametrize("key", ['{"code": "b", "stream": 9, "seed": 2}', "no JSON", "[]"])
+def test_a_chunk_that_also_differs_otherwise_is_foreign(stored, key):
+    assert plan.state_at(stored, key)[0] == "foreign"
 
 
 def test_a_file_that_also_differs_in_the_seed_is_foreign(stored):
