@@ -114,10 +114,12 @@ def test_numbers_like_the_papers_pass_and_a_short_chain_does_not_judge_the_slope
     assert short == {**long, SLOPE: "not judged"}
 
 
-@pytest.mark.parametrize("name", ["late.6", "late.0", "frame.6", "mean.3", "mean.7"])
-def test_numbers_unlike_the_papers_do_not_pass(name) -> None:
+@pytest.mark.parametrize(
+    ("name", "size"), [("late.6", 0.05), ("late.0", 0.05), ("frame.6", 0.05), ("mean.3", 0.05), ("mean.7", 1e-5)]
+)
+def test_numbers_unlike_the_papers_do_not_pass(name, size) -> None:
     a = chains(3000)
-    a[name] = 0.05 * (1 + 0.1 * live().uniform(a[name].shape))
+    a[name] = size * (1 + 0.1 * live().uniform(a[name].shape))
     assert "reproduced" not in {worst_of(gris_f09flat.check(a))}
 
 
