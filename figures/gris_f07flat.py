@@ -55,8 +55,8 @@ WIDENED = [
 ]
 """Views and weights of Fig. 8."""
 
-JUDGED = [("foot of a box, inset", SPATIAL), ("beside a slit, film", SPATIAL)]
-"""A window of neighbours around the pixel, as in the paper; and the dark room beside a slit, nearly a whole film."""
+JUDGED = [("beside a slit, film", SPATIAL)]
+"""The dark room beside a slit, which the ledger's row names; the foot of a box is reported beside it."""
 
 
 # ---------------------------------------------------------------- passes
@@ -238,7 +238,7 @@ def grown(a: Arrays, view: str, mis: str) -> Claim:
         talbot = criteria.ratio_interval(*(squared(a[named(view, "talbot", m)]) for m in (M[-1], best)))[2]
         caveat = f"With defensive weights, the paper's of spatial reuse; with Talbot's the same windows give {talbot}."
         return Claim("GRIS-F08", worse, part, counter=better, reason=why, caveat=caveat)
-    beside = TALBOT if mis == "talbot" else FAR
+    beside = TALBOT if mis == "talbot" else FAR if view.endswith("film") else ""
     return Claim("GRIS-F08", criteria.reported(criteria.ratio_interval(*pair)[2]), part, reason=f"{why} {beside}")
 
 

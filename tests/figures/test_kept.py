@@ -109,3 +109,12 @@ def test_our_own_ledger_expects_what_our_own_kept_runs_found():
     from figures import ledger  # noqa: PLC0415
 
     assert list(kept.unexpected(kept.read(mine.paper), registry.load(mine.modules), ledger.load(mine.ledger))) == []
+
+
+def test_our_own_ledger_expects_nothing_of_the_paper_preset_that_no_kept_run_found():
+    mine = registry.Project()
+    from figures import ledger  # noqa: PLC0415
+
+    found = kept.verdicts(kept.read(mine.paper), registry.declared(registry.load(mine.modules)))
+    expected = {id_: row.expected["paper"] for id_, row in ledger.load(mine.ledger).items()}
+    assert {id_: verdict for id_, verdict in expected.items() if verdict is not None and id_ not in found} == {}
