@@ -69,5 +69,5 @@ def drawn(plan: Plan, arrays: Arrays, claims: Sequence[Claim]) -> dict[str, byte
     """The picture as PNG and PDF, each with the verdicts at its foot."""
     lines = [verdict_line(claim, conditions_of(plan.figure, claim.id)) for claim in claims]
     with style.context():
-        picture = plan.figure.draw(arrays)
+        picture = style.settled(plan.figure.draw(arrays))
         return {f"figure.{kind}": style.render(picture, lines, kind) for kind in style.METADATA}

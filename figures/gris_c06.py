@@ -215,7 +215,7 @@ FIGURE = Figure(
     source="[GRIS 6.4]",
     claims=("GRIS-C06", "GRIS-C07"),
     presets={
-        "quick": {"frames": 3000, "chains": 4000, "long": 2000, "replicas": 64, "blocks": 1},
+        "quick": {"frames": 3000, "chains": 2000, "long": 2000, "replicas": 64, "blocks": 1},
         "paper": {"frames": 10_000, "chains": 20_000, "long": 2000, "replicas": 64, "blocks": 8},
     },
     chunks=chunks,

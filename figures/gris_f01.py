@@ -221,7 +221,7 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"replicas": 8, DIRECT: 8, PT: 128, TRUTH: 4},
+        "quick": {"replicas": 8, DIRECT: 8, PT: 96, TRUTH: 2},
         "paper": {"replicas": 32, DIRECT: 32, PT: 512, TRUTH: 40},
     },
     chunks=chunks,

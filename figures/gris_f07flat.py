@@ -323,7 +323,7 @@ FIGURE = Figure(
     arm="mis",
     presets={
         "quick": {
-            "n": [1, 2, 4, 6, 10, 16],
+            "n": [1, 2, 3, 4, 6, 10],
             "columns": 512,
             "inputs": 4096,
             "M": [1, 3, 5, 9, 17, 33, 65],

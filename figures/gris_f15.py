@@ -126,7 +126,7 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {DIRECT: 24, OURS: 24, PT: 288},
+        "quick": {DIRECT: 16, OURS: 16, PT: 192},
         "paper": {DIRECT: 128, OURS: 128, PT: 1536},
     },
     chunks=chunks,

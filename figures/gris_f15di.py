@@ -238,7 +238,7 @@ FIGURE = Figure(
         ),
     ),
     presets={
-        "quick": {"groups": 20, "biased": 5, "replicas": 32, "frames": 8},
+        "quick": {"groups": 18, "biased": 4, "replicas": 32, "frames": 8},
         "paper": {"groups": 64, "biased": 16, "replicas": 32, "frames": 12},
     },
     chunks=chunks,

@@ -127,7 +127,7 @@ FIGURE = Figure(
     source="[GRIS Fig. 17; 9.3]",
     claims=("GRIS-F17",),
     presets={
-        "quick": {"path tracing": 1024, "path reuse": 512, "truth": 16},
+        "quick": {"path tracing": 1024, "path reuse": 512, "truth": 6},
         "paper": {"path tracing": 8192, "path reuse": 4096, "truth": 128},
     },
     chunks=chunks,

@@ -82,6 +82,13 @@ def panels(
     return picture, picture.subplots(rows, columns, squeeze=False)
 
 
+def settled(picture: "Picture") -> "Picture":
+    """The picture, its layout worked out once for all the files to come."""
+    picture.draw_without_rendering()
+    picture.set_layout_engine("none")
+    return picture
+
+
 def render(picture: "Picture", lines: Sequence[str], kind: str) -> bytes:
     """The picture as a file with `lines` at its foot, which hangs below so that no layout is disturbed.
 
