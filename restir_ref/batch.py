@@ -44,13 +44,13 @@ def columns(index: object, least: int = 0) -> None:
 
     Raises TypeError for anything but an array (N,) of integers, IndexError naming a number that is too small.
     """
-    if not (isinstance(index, np.ndarray) and index.ndim == 1 and index.dtype.kind in "iu"):
+    if not (isinstance(index, np.ndarray) and index.ndim == 1 and index.dtype.kind == "i"):
         kind = f"of shape {index.shape} and type {index.dtype}" if isinstance(index, np.ndarray) else repr(index)
         raise TypeError(
             f"columns are named by an array (N,) of integers, but the index is {kind}: say np.flatnonzero(mask) for "
-            "a mask, np.asarray(index, dtype=int) for a list."
+            "a mask, np.asarray(index, dtype=int) for a list, or for unsigned ones, whose differences wrap."
         )
-    if index.min(initial=least) < least:
+    if index.size and index.min() < least:
         place = int(np.argmax(index < least))
         raise IndexError(f"columns count from 0, but the index holds {index[place]} in place {place}.")
 

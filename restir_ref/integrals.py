@@ -138,7 +138,7 @@ def held(X: Reservoirs, at: Pixels) -> Reservoirs:
     Raises IndexError where X does not hold them.
     """
     n, N = pixels(at.of), np.size(X.W)
-    if at.index.max(initial=-1) >= N:
+    if at.index.size and at.index.max() >= N:
         raise IndexError(
             f"column {at.index.max()} is asked of reservoirs that hold {N}, of images of {n} pixels: they must hold "
             f"whole images, column = replica * {n} + pixel."

@@ -110,9 +110,9 @@ def around(X: Reservoirs, neighbours: Sequence[Pixels]) -> list[Input]:
 
 def entering(X: Reservoirs, source: Pixels) -> Input:
     """Columns `source` of X as an input; W = 0 and c = 0 `NOWHERE`, as if there were no such input."""
-    if source.index.min(initial=0) > NOWHERE:
-        return Input(held(X, source), source)
     nowhere = source.index == NOWHERE
+    if not nowhere.any():
+        return Input(held(X, source), source)
     there = Pixels(source.of, np.where(nowhere, 0, source.index))
     Y = held(X, there)
     return Input(replace(Y, W=np.where(nowhere, 0, Y.W), c=np.where(nowhere, 0, Y.c)), there)
@@ -125,9 +125,10 @@ def reusing(X: Reservoirs, here: Pixels, Y: Reservoirs, sources: Sequence[Pixels
     """
     images = len(here.index) / pixels(here.of)
     if sources and not in_order(here.index):
+        place = int(np.argmax(here.index != np.arange(len(here.index))))
         raise ValueError(
-            f"reuse finds reservoirs by their place, so `here` must be the columns 0 to {len(here.index) - 1} in "
-            f"order, but is {here.index}: for a part of an image, take() its sources and pass Inputs to gris()."
+            f"reuse finds reservoirs by their place, so `here` must be columns 0 to {len(here.index) - 1} in order, "
+            f"but has {here.index[place]} at place {place}: for others take() the sources and pass Inputs to gris()."
         )
     for n in (pixels(source.of) for source in sources):
         if np.size(Y.W) not in (n, images * n):
