@@ -60,9 +60,9 @@ def test_gradients_compare_targets_unless_told():
 
 
 def covered_scene() -> Scene:
-    """Two pixels of the reference scene whose samplers reach all light, f > 0 everywhere."""
+    """Two pixels of the reference scene whose samplers reach all light, f > 0 everywhere, the second one brighter."""
     tables = reference_scene().now.cells
-    f, even = np.maximum(tables.f, 0.25), 1 / tables.v.sum(axis=-1, keepdims=True)
+    f, even = np.maximum(tables.f, 0.25) * [[1], [3], [1], [3]], 1 / tables.v.sum(axis=-1, keepdims=True)
     pdf_ = np.broadcast_to(even, tables.v.shape)[None].copy()
     return Scene([Frame(replace(tables, f=f, p_hat=f, pdf=pdf_), 2)])
 
@@ -78,7 +78,37 @@ def test_another_proxy_on_one_side_is_noticed(proxies):
     assert abs(bias_of_difference(covered_scene(), with_proxies(*proxies))).max() > 0.01
 
 
+@pytest.mark.parametrize("columns", [[0, 2, 7], [5, 4], [3]])
+def test_gradients_of_some_pixels_are_those_of_all_there(columns):
+    here = Pixels(reference_scene().now, np.arange(2 * 40))
+    X, there, k = initial(here, live()), offset(here.of, here.index, 1), np.array(columns)
+    some = gradient_after(X, Pixels(here.of, k), Pixels(here.of, there.index[k]))
+    assert np.array_equal(some, gradient_after(X, here, there)[k])
+
+
+def test_a_gap_between_two_images_takes_either_side_from_its_own():
+    frame = covered_scene().now
+    bright = Frame(replace(frame.cells, f=5 * frame.cells.f), 2)
+    x, zeros = np.arange(4), np.zeros(4, dtype=int)
+    here, there = Pixels(frame, zeros), Pixels(bright, zeros + 1)
+    y = shifted(x, here, there)
+    right = frame.cells.f[0] - 5 * frame.cells.f[1, y.x] * y.J
+    assert gap(x, here, y, there) == pytest.approx(right, rel=1e-12)
+
+
+def test_pair_weights_compare_targets_unless_told():
+    here, there = (Pixels(covered_scene().now, np.full(4, k)) for k in (0, 1))
+    y = shifted(np.arange(4), here, there)
+    default, compared, other = (omega(np.arange(4), here, y, there, *proxy) for proxy in ([], [target], [pdf]))
+    assert np.array_equal(default, compared)
+    assert not np.allclose(default, other)
+
+
 # ---------------------------------------------------------------- pairs
+
+
+def test_pairs_are_as_many_as_they_have_ends():
+    assert [Pairs(three_pixel_scene().now, np.zeros((2, E), dtype=int), magnitude).n for E in (1, 3, 4)] == [1, 3, 4]
 
 
 class Unmasked(Pairs):
@@ -145,10 +175,11 @@ def test_proxies_of_a_pair_are_not_idle():
     assert np.array_equal(default.difference(zeros, default.paired(zeros, x, zeros)), found[0])
 
 
-def test_parts_without_their_sign_contribute_nothing():
+@pytest.mark.parametrize("kind", [Pairs, TossedPairs])
+def test_parts_without_their_sign_contribute_nothing(kind):
     frame = three_pixel_scene().now
     for part in SIGNS.values():
-        pairs = Pairs(frame, ENDS, part)
+        pairs = kind(frame, ENDS, part)
         here = Pixels(pairs, np.arange(2 * 40))
         X = initial(here, live())
         f = shade(X, here)[0]

@@ -26,6 +26,7 @@ TOY, N = overlapping_supports(), 70
 HERE = Pixels(TOY, np.arange(N))
 NEAR = [offset(TOY, HERE.index, by) for by in (1, 2)]
 X = initial(HERE, live())
+X = replace(X, x=X.x.copy())
 
 
 def of(integrals) -> tuple[Pixels, list[Pixels]]:
