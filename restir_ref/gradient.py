@@ -14,7 +14,19 @@ import numpy as np
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
 from restir_ref.guards import apart, read_only
-from restir_ref.integrals import Integrals, Pixels, Proxy, Reservoirs, Sample, Shifted, held, shifted, target, weighted
+from restir_ref.integrals import (
+    Integrals,
+    Pixels,
+    Proxy,
+    Reservoirs,
+    Sample,
+    Shifted,
+    held,
+    shifted,
+    target,
+    times,
+    weighted,
+)
 
 
 def omega(x: Sample, base: Pixels, y: Shifted, offset: Pixels, proxy: Proxy = target) -> Array:
@@ -37,8 +49,7 @@ def gap(x: Sample, base: Pixels, y: Shifted, offset: Pixels) -> Array:
 def one_sided(X: Reservoirs, base: Pixels, offset: Pixels, proxy: Proxy = target) -> Array:
     """<Delta'_ij> = w_ij(y) (f_i(y) - f_j(T_ij y) J) W_y; (N,).  [GPT Eq. 11]"""
     y = shifted(X.x, base, offset)
-    f = np.where(X.W != 0, gap(X.x, base, y, offset), 0)
-    return np.asarray(omega(X.x, base, y, offset, proxy) * f * X.W)
+    return times(omega(X.x, base, y, offset, proxy) * gap(X.x, base, y, offset), X.W)
 
 
 def gradient_after(X: Reservoirs, i: Pixels, j: Pixels, proxy: Proxy = target) -> Array:

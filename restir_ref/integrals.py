@@ -124,7 +124,12 @@ def shifted(x: Sample, at: Pixels, to: Pixels) -> Shifted:
 
 def weighted(at: Pixels, x: Sample, W: Array) -> Array:
     """f(x) W, and 0 where W = 0, whatever f is there; (C, N)."""
-    return np.asarray(np.where(W != 0, at.of.contribution(at.index, read_only(x)), 0) * W)
+    return times(at.of.contribution(at.index, read_only(x)), W)
+
+
+def times(f: Array, W: Array) -> Array:
+    """f W, and 0 where W = 0 and f is infinite or no number: null samples may lie where f is undefined."""
+    return np.asarray(np.where((W != 0) | (abs(f) < np.inf), f, 0) * W)
 
 
 def pixels(of: Integrals) -> int:

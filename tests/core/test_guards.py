@@ -130,8 +130,8 @@ def test_read_only_views_share_their_memory_and_leave_the_original_writeable():
 
 
 def test_results_are_apart_unless_all_their_arrays_are_the_same_writeable_memory():
-    a, b, locked = np.ones(3), np.ones(3), read_only(np.ones(3))
-    for one, other in ((a, b), ((a, b), (a, b.copy())), (locked, locked), (np.ones(0), np.ones(0))):
+    a, b, locked, none = np.ones(3), np.ones(3), read_only(np.ones(3)), np.ones(0)
+    for one, other in ((a, b), ((a, b), (a, b.copy())), (locked, locked), (none, none)):
         apart(one, other, "x")
     for one, other in ((a, a), (a, a[:]), ((a, b), (a, b))):
         with pytest.raises(ValueError, match="two x are the same memory"):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from restir_ref import resampling
 from restir_ref.batch import Array
 from restir_ref.decorrelation import Blue, Move, mutate
 from restir_ref.gradient import Pairs, gap, gradient_after, magnitude, omega, one_sided
-from restir_ref.integrals import NOWHERE, Pixels, Reservoirs, Shifted, p_hat_from, pdf, shifted, target, weighted
+from restir_ref.integrals import NOWHERE, Pixels, Reservoirs, Shifted, p_hat_from, pdf, shifted, target, times, weighted
 from restir_ref.mis import WEIGHTS
 from restir_ref.oracle.laws import bias_of
 from restir_ref.oracle.scenes import offset, three_pixel_scene
@@ -331,6 +332,14 @@ def test_a_contribution_that_is_undefined_where_the_target_is_zero_changes_no_es
 def test_an_undefined_contribution_times_zero_is_noticed():
     Z, here = with_nulls(), of(Undefined(TOY))[0]
     assert np.isnan(here.of.contribution(here.index, Z.x) * Z.W).sum() == (Z.W == 0).sum() > 0
+
+
+def test_times_is_the_product_to_the_sign_of_zero_wherever_f_is_a_number():
+    f, W = np.array([-2.0, -2, 0, 3, np.nan, np.inf, -np.inf]), np.array([0.0, 1, 5, 0.5, 0, 0, 0])
+    assert times(f, W).tobytes() == np.array([-0.0, -2, 0, 1.5, 0, 0, 0]).tobytes()
+    exact = times(np.array([Fraction(1, 3)] * 2, dtype=object), np.array([Fraction(0), Fraction(3)], dtype=object))
+    assert exact.tolist() == [0, 1]
+    assert np.isnan(times(np.array([np.nan, 1.0]), np.array([1.0, np.nan]))).all()
 
 
 def test_an_undefined_contribution_that_counts_is_not_hidden():
