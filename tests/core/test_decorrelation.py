@@ -7,7 +7,7 @@ import pytest
 from scipy.special import ndtr
 
 from restir_ref.batch import Array, total
-from restir_ref.decorrelation import STEPS, Blue, Move, attempt, bounded, energy, gaussian, metropolis, wrapped
+from restir_ref.decorrelation import STEPS, Blue, Move, attempt, bounded, energy, gaussian, metropolis, mutate, wrapped
 from restir_ref.integrals import Pixels, Reservoirs
 from tests.core.stubs import Always, Wrapped, live
 from toy1d import image_of_64, walking
@@ -103,6 +103,64 @@ def test_a_move_that_is_made_keeps_p_hat_W_and_the_confidence():
     assert (kept.W == X.W).all()
 
 
+@dataclass(frozen=True, eq=False)
+class Proposing(Wrapped):
+    """Integrals with p_hat = x that propose x' = x + by, with T(x' -> x) / T(x -> x') = T."""
+
+    by: Array
+    T: Array
+
+    def target(self, index, x):
+        return x + 0.0
+
+    def propose(self, index, x, chance):
+        return x + self.by, self.T
+
+
+FIVE = Pixels(Proposing(LINE, np.array([-0.25, 0.25, -0.2, -0.3125, 0.0]), np.array([1.0, 1, 2, 0.5, 0])), np.arange(5))
+QUARTER = Reservoirs(np.array([0.25, 0.25, 0.25, 0.375, 0.5]), np.array([1.0, 2, 3, 4, 5]), np.ones(5))
+
+
+def test_an_acceptance_is_asked_with_the_move_and_decides_but_for_proposals_in_the_dark():
+    moves: list[Move] = []
+
+    def acceptance(move: Move) -> Array:
+        moves.append(move)
+        return np.array([0.875, 0.75, 0.25, 0.5, 0.125])
+
+    chance = Always(1)
+    Z, accepted = attempt(QUARTER, FIVE, chance, acceptance)
+    (move,), ((refused, a),) = moves[:1], chance.asked
+    assert a.tolist() == [0, 0.75, 0.25, 0.5, 0.125]
+    assert (refused + a).tolist() == [1] * 5
+    assert move.here is FIVE
+    assert move.X is QUARTER
+    assert np.array_equal(move.p_hat, QUARTER.x)
+    assert np.array_equal(move.p_hat_new, move.x_new)
+    assert move.x_new == pytest.approx([0, 0.5, 0.05, 0.0625, 0.5])
+    assert np.array_equal(move.T_ratio, FIVE.of.T)
+    assert accepted.all()
+    assert Z.W == pytest.approx([0, 2 / 2, 3 * 5, 4 * 6, 5])
+    assert attempt(QUARTER, FIVE, Always(0), acceptance)[0].W.tolist() == [1, 2, 3, 4, 5]
+    assert np.array_equal(mutate(QUARTER, FIVE, Always(1), acceptance).x, Z.x)
+
+
+def test_metropolis_is_the_acceptance_unless_told():
+    chance = Always(1)
+    mutate(QUARTER, FIVE, chance)
+    assert chance.asked[0][1] == pytest.approx([0, 1, 0.4, 1 / 12, 0])
+
+
+@pytest.mark.parametrize("T", [-0.5, np.nan, np.inf])
+def test_a_ratio_of_transition_densities_that_is_none_is_refused(T):
+    of = Proposing(LINE, np.zeros(5), np.array([1, 1, T, 1, 1]))
+    said = (
+        rf"the ratio T\(x' -> x\) / T\(x -> x'\) must be .* but is {T} in column 2 .*Return 0 for an invalid proposal"
+    )
+    with pytest.raises(ValueError, match=said):
+        mutate(QUARTER, Pixels(of, np.arange(5)), live())
+
+
 def acceptance_of(p_hat: float, p_hat_new: float, T_ratio: float) -> float:
     """What Metropolis says of one move."""
     p, new, T = (np.array([value]) for value in (p_hat, p_hat_new, T_ratio))
@@ -110,11 +168,14 @@ def acceptance_of(p_hat: float, p_hat_new: float, T_ratio: float) -> float:
 
 
 def test_metropolis_accepts_by_the_ratio_of_targets_and_transitions_and_at_most_surely():
-    assert [acceptance_of(*each) for each in ((2, 1, 1), (2, 1, 0.5), (1, 2, 1), (1, 2, 0.25), (1, 0, 1))] == [
+    assert [
+        acceptance_of(*each) for each in ((2, 1, 1), (2, 1, 0.5), (1, 2, 1), (1, 2, 0.25), (1, 0, 1), (0, 1, 1))
+    ] == [
         0.5,
         0.25,
         1,
         0.5,
+        0,
         0,
     ]
 

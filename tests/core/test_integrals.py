@@ -17,7 +17,7 @@ from restir_ref.oracle.laws import bias_of
 from restir_ref.oracle.scenes import offset, three_pixel_scene
 from restir_ref.resampling import Input, gris
 from restir_ref.restir import initial, resample, reuse_all, shade, spatial, temporal
-from tests.core.stubs import Wrapped, live, same_bits
+from tests.core.stubs import Always, Wrapped, live, same_bits
 from toy1d import image_of_64, overlapping_supports, partial_shift, walking
 
 pytestmark = pytest.mark.kernel
@@ -285,7 +285,7 @@ WRITERS = {
     "shading of all": ("contribution", lambda here, near: reuse_all(X, here, near)),
     "difference": ("contribution", lambda here, near: one_sided(X, here, near[0])),
     "shift of a difference": ("shift", lambda here, near: one_sided(X, here, near[0])),
-    "proposal": ("propose", lambda here, near: mutate(X, here, live())),
+    "proposal": ("propose", lambda here, near: mutate(X, here, Always(0))),
 }
 
 
