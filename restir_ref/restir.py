@@ -110,9 +110,9 @@ def around(X: Reservoirs, neighbours: Sequence[Pixels]) -> list[Input]:
 
 def entering(X: Reservoirs, source: Pixels) -> Input:
     """Columns `source` of X as an input; W = 0 and c = 0 `NOWHERE`, as if there were no such input."""
-    nowhere = source.index == NOWHERE
-    if not nowhere.any():
+    if source.index.min(initial=0) > NOWHERE:
         return Input(held(X, source), source)
+    nowhere = source.index == NOWHERE
     there = Pixels(source.of, np.where(nowhere, 0, source.index))
     Y = held(X, there)
     return Input(replace(Y, W=np.where(nowhere, 0, Y.W), c=np.where(nowhere, 0, Y.c)), there)

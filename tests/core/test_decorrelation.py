@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from restir_ref.batch import Array, total
 from restir_ref.decorrelation import STEPS, Blue, Move, attempt, bounded, energy, gaussian, metropolis, mutate, wrapped
@@ -42,7 +42,8 @@ def test_a_gaussian_step_is_sigma_times_the_normal_number(n):
 
 
 def test_the_longest_step_is_finite_and_nearly_nine_sigma():
-    assert -9 < gaussian(np.zeros(1), 1.0, Lowest()).item() < -8.5
+    assert gaussian(np.zeros(1), 1.0, Lowest()).item() == pytest.approx(ndtri(2.0**-60), rel=1e-12)
+    assert -9 < ndtri(2.0**-60) < -8.5
 
 
 @pytest.mark.parametrize(("n", "right"), [(1.0, [0.35, 0.15]), (-1.0, [0.85, 0.65]), (9.0, [0.35, 0.15])])
@@ -83,6 +84,10 @@ def test_a_step_keeps_the_shape_of_points_and_has_one_ratio_each(step, shape):
     u, ratio = step(np.full(shape, 0.5), 0.1, live())
     assert u.shape == shape
     assert ratio.tolist() == [1] * 4
+
+
+def test_steps_are_known_by_their_names():
+    assert dict(STEPS) == {"wrapped": wrapped, "bounded": bounded}
 
 
 # ---------------------------------------------------------------- moves
@@ -220,6 +225,10 @@ def test_the_luminance_of_a_mutated_colour_is_the_mean_of_its_channels():
     e, e_new = noise.energies(of)
     assert e == pytest.approx(by_hand(noise, noise.luminance), rel=1e-12)
     assert e_new == pytest.approx(by_hand(noise, 3 * LINE.contribution(HERE.index, of.x_new)[0] * W_new), rel=1e-12)
+
+
+def test_the_energy_of_a_pair_decays_with_their_distance_squared_and_the_root_of_their_difference():
+    assert energy(4.2, np.array([0.25, -0.25, 9])) == pytest.approx(np.exp([-4.5, -4.5, -7]), rel=1e-12)
 
 
 def test_one_channel_for_the_mean_of_three_is_noticed():

@@ -11,7 +11,19 @@ from restir_ref import resampling
 from restir_ref.batch import Array
 from restir_ref.decorrelation import Blue, Move, mutate
 from restir_ref.gradient import Pairs, gap, gradient_after, magnitude, omega, one_sided
-from restir_ref.integrals import NOWHERE, Pixels, Reservoirs, Shifted, p_hat_from, pdf, shifted, target, times, weighted
+from restir_ref.integrals import (
+    NOWHERE,
+    Pixels,
+    Reservoirs,
+    Shifted,
+    p_hat_from,
+    pdf,
+    pixels,
+    shifted,
+    target,
+    times,
+    weighted,
+)
 from restir_ref.mis import WEIGHTS
 from restir_ref.oracle.laws import bias_of
 from restir_ref.oracle.scenes import offset, three_pixel_scene
@@ -45,6 +57,10 @@ class Returning(Wrapped):
     x: Callable[[Array], Array] = lambda x: x
     J: Callable[[Array], Array] = lambda J: J
     p: Callable[[Array], Array] = lambda p: p
+    p_hat: Callable[[Array], Array] = lambda p_hat: p_hat
+
+    def target(self, index, x):
+        return self.p_hat(self.of.target(index, x))
 
     def shift(self, x, index, to):
         y = super().shift(x, index, to)
@@ -130,6 +146,40 @@ def test_the_right_jacobian_of_any_shift_is_accepted(act):
 def test_a_bad_density_is_refused(change, said):
     with pytest.raises(ValueError, match=f"the density p .*{said}"):
         pdf(Pixels(Returning(TOY, p=change), HERE.index), X.x)
+
+
+@every_bad_number
+def test_a_bad_target_is_refused(change, said):
+    with pytest.raises(ValueError, match=f"the target p_hat .*{said}"):
+        target(Pixels(Returning(TOY, p_hat=change), HERE.index), X.x)
+
+
+REMEDIES = {
+    "the Jacobian J": (
+        lambda: SHIFTS["back"](J=with_value(np.nan)),
+        r"Return \|dT/dx\| from shift\(\), .* 0 where T is",
+    ),
+    "the density p": (
+        lambda: pdf(Pixels(Returning(TOY, p=with_value(np.nan)), HERE.index), X.x),
+        r"Return the density of the candidates from pdf\(\)",
+    ),
+    "the target p_hat": (
+        lambda: target(Pixels(Returning(TOY, p_hat=with_value(np.nan)), HERE.index), X.x),
+        r"Return \|f\|, or another finite non-negative proxy",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REMEDIES)
+def test_what_is_bad_is_named_first_and_its_remedy_last(what):
+    act, remedy = REMEDIES[what]
+    with pytest.raises(ValueError, match=f"^{what} must be finite and non-negative, but is nan in column 2 .*{remedy}"):
+        act()
+
+
+def test_integrals_without_a_number_of_pixels_are_an_image_of_one():
+    assert pixels(TOY) == 7
+    assert pixels(object()) == 1  # type: ignore[arg-type]
 
 
 def test_densities_and_jacobians_that_are_zero_or_one_number_for_all_are_no_mistakes():
