@@ -1,6 +1,6 @@
 """Laws of single steps and of the energies of blue noise, number by number.  [MCMC 4.2, 5.2]"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -228,7 +228,17 @@ def test_the_luminance_of_a_mutated_colour_is_the_mean_of_its_channels():
 
 
 def test_the_energy_of_a_pair_decays_with_their_distance_squared_and_the_root_of_their_difference():
-    assert energy(4.2, np.array([0.25, -0.25, 9])) == pytest.approx(np.exp([-4.5, -4.5, -7]), rel=1e-12)
+    assert energy(6.3, np.array([0.25, -0.25, 9])) == pytest.approx(np.exp([-9.5, -9.5, -12]), rel=1e-12)
+
+
+def test_every_neighbour_has_its_distance():
+    with pytest.raises(ValueError, match="zip"):
+        replace(blue(1.0), distances=[1]).energies(move(LINE))
+
+
+def test_a_proposal_from_the_dark_has_no_say_in_the_ratio_of_targets():
+    of = replace(move(LINE), p_hat=np.zeros(64))
+    assert (blue(0.0)(of) == 0).all()
 
 
 def test_one_channel_for_the_mean_of_three_is_noticed():

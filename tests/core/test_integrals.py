@@ -177,6 +177,23 @@ def test_what_is_bad_is_named_first_and_its_remedy_last(what):
         act()
 
 
+def test_answers_may_be_lists():
+    listed = Returning(TOY, J=lambda J: J.tolist(), p=lambda p: p.tolist(), p_hat=lambda p: p.tolist())
+    here, (near, _) = of(listed)
+    for found, right in (
+        (target(here, X.x), target(HERE, X.x)),
+        (pdf(here, X.x), pdf(HERE, X.x)),
+        (p_hat_from(near, X.x, here), p_hat_from(NEAR[0], X.x, HERE)),
+    ):
+        assert np.array_equal(found, right)
+
+
+def test_densities_from_elsewhere_are_those_of_targets_unless_told():
+    default, by_target, by_pdf = (p_hat_from(NEAR[0], X.x, HERE, *proxy) for proxy in ([], [target], [pdf]))
+    assert np.array_equal(default, by_target)
+    assert not np.allclose(default, by_pdf)
+
+
 def test_integrals_without_a_number_of_pixels_are_an_image_of_one():
     assert pixels(TOY) == 7
     assert pixels(object()) == 1  # type: ignore[arg-type]
