@@ -59,7 +59,6 @@ EQUIVALENT = {
     "resampling.gris: ...minimum({total(...), LARGEST_CONFIDENCE => LARGEST_CONFIDENCE, ...": COMMUTES,
     "resampling._densities.q: ...inputs[{i => j}]...": "i = j in this branch",
     "resampling._check_input: for ...source.X.c), ('weight W', source.X.W})):": "which of two mistakes is named first",
-    "restir.reuse_all: ...{Input(X, here), *around(...": "the same sum in another order, equal up to rounding",
     "restir.capped: ...minimum({X.c, cap => cap, X.c})...": COMMUTES,
 }
 """Mutants that compute the same, with the reason; `...` stands for anything."""

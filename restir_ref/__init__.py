@@ -7,12 +7,13 @@ One idea: *an image is many integrals that can share samples*.  Read the modules
 """
 
 from restir_ref.chance import Chance, Live
-from restir_ref.integrals import Integrals, Pixels, Reservoirs, Shifted
+from restir_ref.integrals import NOWHERE, Integrals, Pixels, Reservoirs, Shifted
 from restir_ref.mis import WEIGHTS, Weights
 from restir_ref.resampling import Input, gris, select, weigh
 from restir_ref.restir import initial, reuse_all, shade, spatial, temporal
 
 __all__ = [
+    "NOWHERE",
     "WEIGHTS",
     "Chance",
     "Input",

@@ -24,7 +24,7 @@ def map_leaves(f: Callable[..., Any], *batches: Any) -> Any:
     Raises TypeError for a leaf that is neither an array, a tuple nor a dataclass of them.
     """
     first = batches[0]
-    if any(type(each) is not type(first) for each in batches):
+    if any(type(each) is not type(first) for each in batches[1:]):
         kinds = ", ".join(type(each).__name__ for each in batches)
         raise TypeError(f"batches to be merged must have one structure, but corresponding parts are {kinds}.")
     if first is None:
@@ -39,12 +39,29 @@ def map_leaves(f: Callable[..., Any], *batches: Any) -> Any:
     raise TypeError(f"a batch holds arrays, tuples or dataclasses of arrays, not {type(first).__name__}: {first!r}")
 
 
+def columns(index: object, least: int = 0) -> None:
+    """Refuse an `index` that does not number columns by integers >= `least`, (N,).
+
+    Raises TypeError for anything but an array (N,) of integers, IndexError naming a number that is too small.
+    """
+    if not (isinstance(index, np.ndarray) and index.ndim == 1 and index.dtype.kind == "i"):
+        kind = f"of shape {index.shape} and type {index.dtype}" if isinstance(index, np.ndarray) else repr(index)
+        raise TypeError(
+            f"columns are named by an array (N,) of integers, but the index is {kind}: say np.flatnonzero(mask) for "
+            "a mask, np.asarray(index, dtype=int) for a list, or for unsigned ones, whose differences wrap."
+        )
+    if index.size and index.min() < least:
+        place = int(np.argmax(index < least))
+        raise IndexError(f"columns count from 0, but the index holds {index[place]} in place {place}.")
+
+
 def take(batch: Batch, index: Array) -> Batch:
-    """Gather columns `index` (N,) of every leaf.
+    """Gather columns `index` (N,), integers >= 0, of every leaf.
 
     `ndarray.take` keeps C order; `leaf[:, index]` would return Fortran order and silently turn
     the struct of arrays into an array of structs, which slows down everything after it.
     """
+    columns(index)
     gathered: Batch = map_leaves(lambda leaf: leaf.take(index, axis=-1), batch)
     return gathered
 

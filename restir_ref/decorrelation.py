@@ -14,8 +14,8 @@ from scipy.special import ndtri
 
 from restir_ref.batch import Array, ratio, total, where
 from restir_ref.chance import Chance
-from restir_ref.guards import nonnegative
-from restir_ref.integrals import Integrals, Pixels, Reservoirs, Sample, target
+from restir_ref.guards import apart, nonnegative, read_only
+from restir_ref.integrals import Integrals, Pixels, Reservoirs, Sample, target, weighted
 
 
 class Mutable(Integrals, Protocol):
@@ -63,9 +63,10 @@ def attempt(X: Reservoirs, here: Pixels, chance: Chance, acceptance: Acceptance)
     # erratum: the prose of 5.2.4 turns the ratio of W upside down, unlike 3.2.4 and Alg. 6; and Alg. 3
     # forgets all accepted moves if the last proposal is rejected.
     of: Mutable = here.of  # type: ignore[assignment]
-    x_new, T_ratio = of.propose(here.index, X.x, chance)
+    x_new, T_ratio = of.propose(here.index, read_only(X.x), chance)
     nonnegative(T_ratio, "the ratio T(x' -> x) / T(x -> x')", "Return 0 for an invalid proposal from propose().")
     move = Move(here, X, x_new, target(here, X.x), target(here, x_new), T_ratio)
+    apart(move.p_hat, move.p_hat_new, "results of target()")
     a = np.where(move.p_hat_new > 0, acceptance(move), 0)
     accepted = chance.choose(np.stack([1 - a, a])) == 1
     W_new = X.W * ratio(move.p_hat, np.where(accepted, move.p_hat_new, 1))
@@ -139,7 +140,7 @@ class Blue:
     def energies(self, move: Move) -> tuple[Array, Array]:
         """e and e': mean energies with the neighbours of the old luminance and of the mutated one.  [MCMC Alg. 6]"""
         W_new = move.X.W * ratio(move.p_hat, move.p_hat_new)
-        mutated = (move.here.of.contribution(move.here.index, move.x_new) * W_new).mean(axis=0)
+        mutated = weighted(move.here, move.x_new, W_new).mean(axis=0)
         return self._mean_energy(self.luminance), self._mean_energy(mutated)
 
     def _mean_energy(self, luminance: Array) -> Array:

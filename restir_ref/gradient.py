@@ -11,9 +11,22 @@ from types import MappingProxyType
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio, take
+from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
-from restir_ref.integrals import Integrals, Pixels, Proxy, Reservoirs, Sample, Shifted, target
+from restir_ref.guards import apart, read_only
+from restir_ref.integrals import (
+    Integrals,
+    Pixels,
+    Proxy,
+    Reservoirs,
+    Sample,
+    Shifted,
+    held,
+    shifted,
+    target,
+    times,
+    weighted,
+)
 
 
 def omega(x: Sample, base: Pixels, y: Shifted, offset: Pixels, proxy: Proxy = target) -> Array:
@@ -22,25 +35,26 @@ def omega(x: Sample, base: Pixels, y: Shifted, offset: Pixels, proxy: Proxy = ta
     w = 1 where the shift is undefined.  With q = p, base paths of f = 0 must be kept, for w > 0 and
     their offset paths may have f > 0; with q = p_hat they have w = 0 and may be thrown away.
     """
-    q = proxy(base, x)
-    return ratio(q, q + proxy(offset, y.x) * y.J)
+    q, q_offset = proxy(base, x), proxy(offset, y.x)
+    apart(q, q_offset, "results of the proxy")
+    return ratio(q, q + q_offset * y.J)
 
 
 def gap(x: Sample, base: Pixels, y: Shifted, offset: Pixels) -> Array:
     """f_i(x) - f_j(T_ij x) J, y = T_ij x; (N,).  [GPT Eq. 2, 15]"""
-    f_base, f_offset = (at.of.contribution(at.index, z)[0] for at, z in ((base, x), (offset, y.x)))
-    return np.asarray(f_base - f_offset * y.J)
+    f_base = base.of.contribution(base.index, read_only(x))[0]
+    return np.asarray(f_base - weighted(offset, y.x, y.J)[0])
 
 
 def one_sided(X: Reservoirs, base: Pixels, offset: Pixels, proxy: Proxy = target) -> Array:
     """<Delta'_ij> = w_ij(y) (f_i(y) - f_j(T_ij y) J) W_y; (N,).  [GPT Eq. 11]"""
-    y = base.of.shift(X.x, base.index, offset)
-    return omega(X.x, base, y, offset, proxy) * gap(X.x, base, y, offset) * X.W
+    y = shifted(X.x, base, offset)
+    return times(omega(X.x, base, y, offset, proxy) * gap(X.x, base, y, offset), X.W)
 
 
 def gradient_after(X: Reservoirs, i: Pixels, j: Pixels, proxy: Proxy = target) -> Array:
     """<Delta_ij> = <Delta'_ij> - <Delta'_ji> from the pixels' own samples, all in X; (N,).  [GPT Eq. 12]"""
-    return one_sided(take(X, i.index), i, j, proxy) - one_sided(take(X, j.index), j, i, proxy)
+    return one_sided(held(X, i), i, j, proxy) - one_sided(held(X, j), j, i, proxy)
 
 
 Part = Callable[[Array], Array]
@@ -107,7 +121,7 @@ class Pairs:
 
     def paired(self, index: Array, x: Sample, k: Array) -> Paired:
         """The base path x on side k with its offset path T_ij(x) on the other: the inner shift.  [GPT 4.2.1]"""
-        return Paired(x, k, self.of.shift(x, self.end(index, k).index, self.end(index, 1 - k)))
+        return Paired(x, k, shifted(x, self.end(index, k), self.end(index, 1 - k)))
 
     def target(self, index: Array, x: Paired) -> Array:
         """p_hat = max(+-w* G, 0), or w* |G|; (N,).  [GPT Eq. 19, 25-26]"""
@@ -122,7 +136,7 @@ class Pairs:
     def shift(self, x: Paired, index: Array, to: Pixels) -> Shifted:
         """T*: the base path moves from i to i' or j to j', its offset path is rebuilt; J* = J_tau.  [GPT Eq. 21-22]"""
         there: Pairs = to.of  # type: ignore[assignment]
-        tau = self.of.shift(x.x, self.end(index, x.k).index, there.end(to.index, x.k))
+        tau = shifted(x.x, self.end(index, x.k), there.end(to.index, x.k))
         return Shifted(there.paired(to.index, tau.x, x.k), tau.J)
 
     def end(self, index: Array, k: Array) -> Pixels:

@@ -1,10 +1,14 @@
 """Checks of what users hand in; a failure names the value, its place and the remedy."""
 
-from numbers import Integral
+from collections.abc import Mapping
+from numbers import Integral, Real
+from typing import Any, TypeVar
 
 import numpy as np
 
-from restir_ref.batch import Array
+from restir_ref.batch import Array, Batch, map_leaves
+
+Member = TypeVar("Member")
 
 
 def nonnegative(values: Array, what: str, remedy: str) -> Array:
@@ -23,15 +27,79 @@ def nonnegative(values: Array, what: str, remedy: str) -> Array:
 
 
 def per_column(values: Array, n: int, what: str) -> Array:
-    """Return `values` (n,), or one value to broadcast.
+    """Return `values` (n,), or one number () to broadcast.
 
     Raises ValueError naming both shapes.
     """
-    if values.shape in ((n,), (1,), ()):
+    if values.shape in ((n,), ()):
         return values
     raise ValueError(
         f"{what} has shape {values.shape}, but this batch has {n} columns: the last axis must be {n}, and the only one."
     )
+
+
+def aligned(batch: Batch, n: int, what: str) -> Batch:
+    """Return `batch` if all its leaves have n columns.
+
+    Raises ValueError naming the shape of one that has not: it would be broadcast without a word.
+    """
+
+    def checked(leaf: Array) -> Array:
+        if leaf.shape[-1:] != (n,):
+            raise ValueError(
+                f"{what} have a part of shape {leaf.shape}, but this batch has {n} columns: every array of a sample "
+                f"ends in the batch axis, {n} long."
+            )
+        return leaf
+
+    map_leaves(checked, batch)
+    return batch
+
+
+def read_only(batch: Batch) -> Batch:
+    """The same memory, into which nobody can write by these arrays."""
+
+    def locked(leaf: Array) -> Array:
+        view = leaf.view()
+        view.flags.writeable = False
+        return view
+
+    views: Batch = map_leaves(locked, batch)
+    return views
+
+
+def apart(one: Batch, other: Batch, what: str) -> None:
+    """Raise ValueError if two results are, array by array, the same memory that may still be written into."""
+    if _writeable(one) == _writeable(other):
+        raise ValueError(
+            f"two {what} are the same memory, so that the second one has overwritten the first: return new arrays "
+            "each time, or read-only ones."
+        )
+
+
+def _writeable(batch: Batch) -> list[Any]:
+    """Where the arrays of a batch begin; what cannot be written into is nowhere."""
+    found: list[Any] = []
+
+    def noted(leaf: Array) -> Array:
+        found.append(leaf.__array_interface__["data"][0] if leaf.flags.writeable and leaf.size else object())
+        return leaf
+
+    map_leaves(noted, batch)
+    return found
+
+
+def positive(value: object, what: str, remedy: str) -> None:
+    """Raise ValueError, naming it, for a value that is no number > 0."""
+    if not (isinstance(value, Real) and float(value) > 0):
+        raise ValueError(f"{what} must be one positive number, but is {value!r}; {remedy}")
+
+
+def named(family: Mapping[str, Member], name: str, what: str) -> Member:
+    """family[name]; raises ValueError listing the names there are."""
+    if name in family:
+        return family[name]
+    raise ValueError(f"there is no {what} {name!r}, only {', '.join(map(repr, family))}.")
 
 
 def whole(value: object, least: int, what: str, remedy: str) -> None:

@@ -12,15 +12,24 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array
+from restir_ref.batch import Array, columns, take
 from restir_ref.chance import Chance
-from restir_ref.guards import nonnegative, per_column
+from restir_ref.guards import aligned, nonnegative, per_column, read_only
 
 Sample = Any
 
 
+NOWHERE = -1
+"""The column of a source that does not exist: disoccluded, outside of the image, no history yet."""
+
+
 class Integrals(Protocol):
-    """One frame's (or one sign's) integrals I_i = int_Omega_i f_i, one per column of `index`."""
+    """One frame's (or one sign's) integrals I_i = int_Omega_i f_i, one per column of `index`.
+
+    Methods are functions of their arguments: they write into none of them (samples come read-only), and
+    return arrays that nobody writes into afterwards, new ones or parts of the samples; never a buffer
+    that the next call fills again.
+    """
 
     def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Sample, Array]]:
         """Yield (x, m W): initial samples with their MIS weight times W = 1/p(x), each (N,).
@@ -55,10 +64,17 @@ class Tractable(Integrals, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Pixels:
-    """N integrals, one per column: `of` says which image, `index` (N,) which column of it."""
+    """N integrals, one per column: `of` says which image, `index` (N,) which column of it.
+
+    As a source of reuse, `index` is `NOWHERE` where there is none: the column enters with W = 0 and c = 0.
+    Raises TypeError for an index that is no array (N,) of integers, IndexError for one below `NOWHERE`.
+    """
 
     of: Integrals
     index: Array
+
+    def __post_init__(self) -> None:
+        columns(self.index, NOWHERE)
 
 
 @dataclass(frozen=True)
@@ -83,7 +99,7 @@ class Reservoirs:
 
 def target(at: Pixels, x: Sample) -> Array:
     """p_hat(x) of the integrals `at`, checked: (N,), finite and >= 0."""
-    p_hat = per_column(np.asarray(at.of.target(at.index, x)), len(at.index), "the target p_hat")
+    p_hat = per_column(np.asarray(at.of.target(at.index, read_only(x))), len(at.index), "the target p_hat")
     return nonnegative(p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target().")
 
 
@@ -94,16 +110,45 @@ Proxy = Callable[[Pixels, Sample], Array]
 def pdf(at: Pixels, x: Sample) -> Array:
     """p(x), checked: for integrals that also know the density of their candidates; (N,)."""
     of: Tractable = at.of  # type: ignore[assignment]
-    p = per_column(np.asarray(of.pdf(at.index, x)), len(at.index), "the density p")
+    p = per_column(np.asarray(of.pdf(at.index, read_only(x))), len(at.index), "the density p")
     return nonnegative(p, "the density p", "Return the density of the candidates from pdf().")
 
 
 def shifted(x: Sample, at: Pixels, to: Pixels) -> Shifted:
-    """y = T(x) from the domains of `at` to those of `to`; J is checked: (N,), finite and >= 0."""
-    y = at.of.shift(x, at.index, to)
+    """y = T(x) from the domains of `at` to those of `to`, N columns; J is checked: (N,), finite and >= 0."""
+    y = at.of.shift(read_only(x), at.index, to)
     J = per_column(np.asarray(y.J), len(to.index), "the Jacobian J")
     nonnegative(J, "the Jacobian J", "Return |dT/dx| from shift(), its absolute value, and 0 where T is undefined.")
-    return y
+    return Shifted(aligned(y.x, len(to.index), "the samples y = T(x) of a shift"), J)
+
+
+def weighted(at: Pixels, x: Sample, W: Array) -> Array:
+    """f(x) W, and 0 where W = 0, whatever f is there; (C, N)."""
+    return times(at.of.contribution(at.index, read_only(x)), W)
+
+
+def times(f: Array, W: Array) -> Array:
+    """f W, and 0 where W = 0 and f is infinite or no number: null samples may lie where f is undefined."""
+    return np.asarray(np.where((W != 0) | (abs(f) < np.inf), f, 0) * W)
+
+
+def pixels(of: Integrals) -> int:
+    """The number of pixels n of integrals that form an image; others count as an image of one."""
+    return int(getattr(of, "n", 1))
+
+
+def held(X: Reservoirs, at: Pixels) -> Reservoirs:
+    """Columns `at.index` of X, which holds images of `at.of` in order: column k is at place k.
+
+    Raises IndexError where X does not hold them.
+    """
+    n, N = pixels(at.of), np.size(X.W)
+    if at.index.size and at.index.max() >= N:
+        raise IndexError(
+            f"column {at.index.max()} is asked of reservoirs that hold {N}, of images of {n} pixels: they must hold "
+            f"whole images, column = replica * {n} + pixel."
+        )
+    return take(X, at.index)
 
 
 def p_hat_from(j: Pixels, y: Sample, here: Pixels, proxy: Proxy = target) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
+from restir_ref.guards import named
 from restir_ref.integrals import Image, Pixels, Reservoirs
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, spatial, temporal
@@ -52,11 +53,11 @@ def frame(
     """
     X = initial(here, chance, preset.trees)
     if history is not None:
-        X = temporal(X, here, history, before, chance, mis=WEIGHTS[preset.along], cap=preset.cap)
+        X = temporal(X, here, history, before, chance, mis=named(WEIGHTS, preset.along, "MIS weight"), cap=preset.cap)
     for _ in range(preset.rounds):
         image: Image = here.of  # type: ignore[assignment]
         near = around(image, here.index, preset.neighbours, preset.radius, chance)
-        X = spatial(X, here, near, chance, mis=WEIGHTS[preset.across])
+        X = spatial(X, here, near, chance, mis=named(WEIGHTS, preset.across, "MIS weight"))
     return X
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from restir_ref.batch import Array, pick, ratio, total
 from restir_ref.chance import Chance
-from restir_ref.guards import nonnegative, per_column
+from restir_ref.guards import aligned, apart, nonnegative, per_column
 from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, p_hat_from, shifted, target
 from restir_ref.mis import CANONICAL_COVERS, Confidences, Density, Weights
 
@@ -49,9 +49,7 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
     the weights need one.
     """
     c = _confidences(inputs, here, mis)
-    for i, source in enumerate(inputs):
-        y = _shifted(source, here)
-        p_hat = target(here, y.x)
+    for i, (source, y, p_hat) in enumerate(_landed(inputs, here)):
         q = _densities(i, y, p_hat, inputs, here, mis.proxy)
         m = mis.m(i, q, c)
         c_over_m = None if mis.c is None else ratio(mis.c(i, q, c), m)
@@ -120,6 +118,20 @@ def _resampling_weights(w: Sequence[Array]) -> Array:
     return resampling_weight(np.stack(np.broadcast_arrays(*w)))
 
 
+def _landed(inputs: Sequence[Input], here: Pixels) -> Iterator[tuple[Input, Shifted, Array]]:
+    """Every input with its Y_i and p_hat(Y_i), none of which has overwritten the one before it."""
+    found: dict[str, Sample] = {}
+    for source in inputs:
+        y = _shifted(source, here)
+        p_hat = target(here, y.x)
+        moved = {} if source.at is here else {"samples from shift()": y.x, "Jacobians from shift()": y.J}
+        new = {"results of target()": p_hat, **moved}
+        for what in new.keys() & found.keys():
+            apart(found[what], new[what], what)
+        found |= new
+        yield source, y, p_hat
+
+
 def _shifted(source: Input, here: Pixels) -> Shifted:
     """Y_i = T_i(X_i); the identity for canonical inputs."""
     if source.at is here:
@@ -166,6 +178,7 @@ def _check_input(source: Input, n: int, name: str) -> None:
         raise ValueError(
             f"{name} has {len(source.at.index)} columns, but this pass has {n}: take() the right ones first."
         )
+    aligned(source.X.x, n, f"the samples of {name}")
     for what, values in (("weight W", source.X.W), ("confidence c", source.X.c)):
         per_column(values, n, f"the {what} of {name}")
         nonnegative(values, f"the {what} of {name}", "W comes from 1/p or from a pass, c counts samples.")

@@ -5,15 +5,15 @@ samples.  A loop is written by its caller from these passes: a renderer steps on
 positivization two.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from restir_ref.batch import Array, take, total
+from restir_ref.batch import Array, total
 from restir_ref.chance import Chance
-from restir_ref.guards import nonnegative, per_column
-from restir_ref.integrals import Pixels, Reservoirs, Sample, target
+from restir_ref.guards import apart, nonnegative, per_column, positive, whole
+from restir_ref.integrals import NOWHERE, Pixels, Reservoirs, Sample, held, pixels, target, weighted
 from restir_ref.mis import WEIGHTS, Weights
 from restir_ref.resampling import Candidate, Input, contribution_weight, gris, select, weigh
 
@@ -23,6 +23,7 @@ M_CAP = 20
 
 def initial(here: Pixels, chance: Chance, M: int = 1) -> Reservoirs:
     """RIS: resample M independent sets of candidates into one sample of confidence 1.  [GRIS Eq. 1-6; 6.3]"""
+    whole(M, 1, "the number M of candidate sets", "Leave it out for one set.")
     drawn = ((x, mW / M) for _ in range(M) for x, mW in here.of.candidates(here.index, chance))
     return resample(drawn, here, chance)
 
@@ -30,7 +31,17 @@ def initial(here: Pixels, chance: Chance, M: int = 1) -> Reservoirs:
 def resample(drawn: Iterable[tuple[Sample, Array]], here: Pixels, chance: Chance) -> Reservoirs:
     """RIS over candidates (x, m W), W = 1/p; list them first to share them between integrals."""
     offered = (Candidate(x, target(here, x), _checked(mW, len(here.index))) for x, mW in drawn)
-    return select(offered, chance, np.ones(len(here.index), dtype=int))
+    return select(_anew(offered), chance, np.ones(len(here.index), dtype=int))
+
+
+def _anew(offered: Iterable[Candidate]) -> Iterator[Candidate]:
+    """The candidates, none of which is in the memory of the one before it."""
+    last = None
+    for each in offered:
+        if last is not None:
+            apart(last.x, each.x, "samples from candidates()")
+            apart(last.p_hat, each.p_hat, "results of target()")
+        yield (last := each)
 
 
 def _checked(mW: Array, n: int) -> Array:
@@ -50,12 +61,11 @@ def temporal(
 ) -> Reservoirs:
     """Resample new samples X with the history Y of the previous frame.  [GRIS 6.3 step 2, 6.4]
 
-    Y holds the whole previous frame; each of `before` names one source column per pixel (motion
-    vectors), in the previous frame's integrals.  The confidence of history is capped on entry,
-    c <- min(c, cap), where [GRIS 6.2] caps the result of a merge.
+    Y holds the whole previous frame, column k at place k; each of `before` names one source column per
+    pixel (motion vectors), in the previous frame's integrals, or `NOWHERE` where there is no history.
+    The confidence of history is capped on entry, c <- min(c, cap), where [GRIS 6.2] caps the result of a merge.
     """
-    history = [Input(capped(take(Y, source.index), cap), source) for source in before]
-    return gris([Input(X, here), *history], here, mis, chance)
+    return gris(reusing(X, here, capped(Y, cap), before), here, mis, chance)
 
 
 def spatial(
@@ -67,7 +77,7 @@ def spatial(
     mis: Weights = WEIGHTS["defensive"],
 ) -> Reservoirs:
     """Resample every pixel's reservoir with its neighbours', all in X.  [GRIS 6.3 step 3]"""
-    return gris([Input(X, here), *around(X, neighbours)], here, mis, chance)
+    return gris(reusing(X, here, X, neighbours), here, mis, chance)
 
 
 def reuse_all(
@@ -78,22 +88,58 @@ def reuse_all(
     mis: Weights = WEIGHTS["talbot"],
 ) -> Array:
     """sum_i f(Y_i) c_i W_i J_i: shift all, select none; (C, N).  [GRIS Eq. 13-14; Bekaert 2002]"""
-    shifted = weigh([Input(X, here), *around(X, neighbours)], here, mis)
-    return total([here.of.contribution(here.index, y.x) * contribution_weight(y) for y in shifted])
+    shifted = weigh(reusing(X, here, X, neighbours), here, mis)
+    return total([weighted(here, y.x, contribution_weight(y)) for y in shifted])
 
 
 def shade(X: Reservoirs, here: Pixels) -> Array:
-    """<I> = f(X) W, shape (C, N).  [GRIS Eq. 3; 6.3 step 4]"""
-    return here.of.contribution(here.index, X.x) * X.W
+    """<I> = f(X) W, and 0 for null samples; shape (C, N).  [GRIS Eq. 3; 6.3 step 4]"""
+    return weighted(here, X.x, X.W)
 
 
 def capped(X: Reservoirs, cap: float) -> Reservoirs:
     """Confidence c <- min(c, M_c); needs cap > 0, for a null confidence is biased.  [GRIS 6.4]"""
-    if not cap > 0:
-        raise ValueError(f"the cap M_c must be positive, but is {cap!r}; leave temporal reuse out instead.")
+    positive(cap, "the cap M_c", "leave temporal reuse out instead.")
     return replace(X, c=np.minimum(X.c, cap))
 
 
 def around(X: Reservoirs, neighbours: Sequence[Pixels]) -> list[Input]:
-    """The neighbours' reservoirs as inputs of a pass."""
-    return [Input(take(X, near.index), near) for near in neighbours]
+    """The neighbours' reservoirs, columns of X, as inputs of a pass."""
+    return [entering(X, near) for near in neighbours]
+
+
+def entering(X: Reservoirs, source: Pixels) -> Input:
+    """Columns `source` of X as an input; W = 0 and c = 0 `NOWHERE`, as if there were no such input."""
+    if source.index.min(initial=0) > NOWHERE:
+        return Input(held(X, source), source)
+    nowhere = source.index == NOWHERE
+    there = Pixels(source.of, np.where(nowhere, 0, source.index))
+    Y = held(X, there)
+    return Input(replace(Y, W=np.where(nowhere, 0, Y.W), c=np.where(nowhere, 0, Y.c)), there)
+
+
+def reusing(X: Reservoirs, here: Pixels, Y: Reservoirs, sources: Sequence[Pixels]) -> list[Input]:
+    """X and the columns of Y that `sources` name: the inputs of a pass that finds reservoirs by their place.
+
+    Raises ValueError unless `here` are images in order, and Y as many of the sources' image, or one for all.
+    """
+    images = len(here.index) / pixels(here.of)
+    if sources and not in_order(here.index):
+        place = int(np.argmax(here.index != np.arange(len(here.index))))
+        raise ValueError(
+            f"reuse finds reservoirs by their place, so `here` must be columns 0 to {len(here.index) - 1} in order, "
+            f"but has {here.index[place]} at place {place}: for others take() the sources and pass Inputs to gris()."
+        )
+    for n in (pixels(source.of) for source in sources):
+        if np.size(Y.W) not in (n, images * n):
+            raise ValueError(
+                f"the sources' image has {n} pixels and the pass is for {images:g} images, but there are "
+                f"{np.size(Y.W)} reservoirs: hand over {images * n:g}, or {n} for all, with the image they are of."
+            )
+    return [Input(X, here), *around(Y, sources)]
+
+
+def in_order(index: Array) -> bool:
+    """Whether `index` is 0 .. N - 1: whole numbers that rise from 0 to N - 1 in N places leave none out."""
+    ends = index[:1].tolist() + index[-1:].tolist()
+    return not ends or (ends == [0, len(index) - 1] and bool((index[1:] > index[:-1]).all()))

@@ -63,7 +63,7 @@ class Answering(Wrapped):
     p_hat: Array
 
     def target(self, index, x):
-        return self.p_hat
+        return self.p_hat.copy()
 
 
 def with_target(p_hat: Array) -> Pixels:
@@ -144,7 +144,10 @@ SHAPES = {
         "take() the right ones first",
     ),
     "a source pixel beyond the frame": Mistake(
-        lambda: temporal(X, HERE, X, [Pixels(TOY, INDEX + 1)], live()), IndexError, "index 4", "size 4"
+        lambda: temporal(X, HERE, X, [Pixels(TOY, INDEX + 1)], live()),
+        IndexError,
+        "column 4 is asked of reservoirs that hold 4,",
+        "they must hold whole images",
     ),
     "no inputs": Mistake(
         lambda: gris([], HERE, TALBOT, live()), ValueError, "(M = 0)", "pass the pixel's own reservoirs"

@@ -83,6 +83,14 @@ def test_pick_spreads_leaves_that_all_columns_share():
     assert same(pick([np.array(2.0), np.array([3.0])], np.array([0, 1, 0])), np.array([2.0, 3.0, 2.0]))
 
 
+@pytest.mark.parametrize("M", [1, 2, 3])
+@pytest.mark.parametrize("shape", [(), (1,), (3, 1), (2, 3, 1)])
+def test_pick_spreads_leaves_of_one_column_over_the_batch_axis_alone(shape, M):
+    s = np.array([0, 1, 2, 0]) % M
+    picked = pick([np.full(shape, 10.0 * k) for k in range(M)], s)
+    assert np.array_equal(picked, np.broadcast_to(10.0 * s, (*shape[:-1], 4)))
+
+
 def test_nothing_is_changed_in_place():
     before, s = batch(1, 2, 3), np.array([0, 1, 1])
     picked = pick([before, batch(4, 5, 6)], s)
@@ -128,6 +136,22 @@ def test_a_leaf_that_is_no_array_is_named_with_what_is_allowed(use, wrong, said)
         use(wrong, np.array([0]))
     assert said in str(complaint.value)
     assert "arrays, tuples or dataclasses of arrays" in str(complaint.value)
+
+
+ODD = {"the first": (0, "tuple, ndarray, ndarray"), "the last": (2, "ndarray, ndarray, tuple")}
+
+
+@pytest.mark.parametrize(("odd", "kinds"), ODD.values(), ids=ODD)
+def test_a_batch_of_another_structure_is_refused_wherever_it_is(odd, kinds):
+    batches = [np.ones(1)] * 3
+    batches[odd] = (np.ones(1),)  # type: ignore[call-overload]
+    with pytest.raises(TypeError, match=f"must have one structure, but corresponding parts are {kinds}"):
+        map_leaves(lambda *leaves: leaves[0], *batches)
+
+
+def test_a_missing_leaf_and_an_array_do_not_merge():
+    with pytest.raises(TypeError, match="corresponding parts are NoneType, ndarray"):
+        where(np.ones(1) == 1, Inner(np.ones(1)), Inner(np.ones(1), np.ones(1)))  # type: ignore[arg-type]
 
 
 def test_tuples_of_unequal_length_do_not_merge():

@@ -129,6 +129,15 @@ def test_at_the_ends_of_a_row_neighbours_are_mirrored(around):
         assert set(found.ravel()) == wanted
 
 
+@each_choice
+@pytest.mark.parametrize("n", [1, 2, 3, 10])
+def test_neighbours_of_a_radius_beyond_the_row_are_pixels_of_it(around, n):
+    pixel = np.arange(3 * n * 50)
+    found = steps(around, n, 6, 20, pixel) + pixel
+    assert (found // n == pixel // n).all()
+    assert set(found.ravel() % n) == set(range(n))
+
+
 PRESET = Preset(trees=3, rounds=2, neighbours=2, radius=3, cap=1.5, along="1/Z", across="talbot")
 
 
