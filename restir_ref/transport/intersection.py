@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from restir_ref.batch import Array, ratio, total
+from restir_ref.transport.coincidence import foremost
 from restir_ref.transport.vectors import dot
 
 if TYPE_CHECKING:
@@ -36,6 +37,10 @@ def intersect(s: "Scene", x: Array, w: Array) -> tuple[Array, Array]:
     near, prim = np.empty(x.shape[-1]), np.empty(x.shape[-1], dtype=int)
     for part in _blocks(s, x.shape[-1]):
         near[part], prim[part] = _nearest(s, x[:, part], w[:, part])
+    if s.coincidence.others.size:
+        hit = np.flatnonzero(near)
+        x, w = x.take(hit, axis=-1), w.take(hit, axis=-1)
+        prim[hit] = foremost(s, x + w / near[hit], prim[hit], w)
     with np.errstate(divide="ignore"):
         return 1 / near, prim
 
