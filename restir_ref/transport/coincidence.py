@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from restir_ref.batch import Array, take, total
-from restir_ref.transport.vectors import dot, norm
+from restir_ref.transport.vectors import dot
 
 if TYPE_CHECKING:
     from restir_ref.transport.scene import Scene
@@ -69,12 +69,10 @@ def _seen_from(maps: Array, offsets: Array, a: Array, v: Array, least: float) ->
     """Whether corners v (P, d, d) lie in the plane of facet a (P,), and whether all are beyond one of its faces."""
     d = maps.shape[1]
     slope = maps.reshape(d, -1, d)[:, a]
-    *b, h = np.einsum("kpc,pvc->kpv", slope, v) + offsets.reshape(d, -1, 1)[:, a]
-    depth = [1 - total(b), *b]
-    beyond = [
-        b_k.max(axis=1) <= least * norm(s_k.T) for b_k, s_k in zip(depth, [-total(slope[:-1]), *slope[:-1]], strict=True)
-    ]
-    return (np.abs(h) <= least).all(axis=1), np.logical_or.reduce(beyond)
+    at = np.einsum("kpc,pvc->kpv", slope, v) + offsets.reshape(d, -1, 1)[:, a]
+    at, slope = (np.concatenate([[first - each[:-1].sum(axis=0)], each]) for first, each in ((1, at), (0, slope)))
+    beyond = at[:-1].max(axis=2) <= least * np.linalg.norm(slope[:-1], axis=2)
+    return (np.abs(at[-1]) <= least).all(axis=1), beyond.any(axis=0)
 
 
 def foremost(s: "Scene", x: Array, prim: Array, w: Array) -> Array:

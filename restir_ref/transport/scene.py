@@ -127,7 +127,7 @@ def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], 
         emission,
         pdf_area,
         _lights(corners, normals, emission, pdf_area, share),
-        coincidence(pairs, emission.any(axis=0)),
+        coincidence(pairs, emission.max(axis=0) > 0),
         extent,
     )
 
