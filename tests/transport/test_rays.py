@@ -1,5 +1,7 @@
 """Rays against a reference that solves linear systems, and where floating point is most likely to go astray."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,22 @@ def test_blocks_of_rays_are_a_matter_of_speed_only(space, monkeypatch):
     whole = (*intersect(s, x, w), visible(s, x, w))
     monkeypatch.setattr(intersection, "BLOCK", 1)
     assert all((a == b).all() for a, b in zip(whole, (*intersect(s, x, w), visible(s, x, w)), strict=True))
+
+
+def blocks(simplices: int, n: int) -> list[slice]:
+    return [*intersection._blocks(SimpleNamespace(material=range(simplices)), n)]
+
+
+@pytest.mark.parametrize("simplices", [1, 20, 128, 129, 700, 5000, 40_000])
+def test_no_block_exceeds_the_cache_and_none_is_a_lone_column_that_need_not_be(simplices):
+    wide = max(intersection.BLOCK // simplices, 256)
+    for n in (0, 1, 2, 3, 7, 255, 257, 1000, 70_001):
+        found = blocks(simplices, n)
+        assert [k for each in found[:100] for k in range(n)[each]] == [*range(found[:100][-1].stop if n else 0)]
+        widths = [each.stop - each.start for each in found]
+        assert sum(widths) == n
+        assert simplices * max(widths, default=0) <= 4 * intersection.BLOCK
+        assert widths.count(1) == (n % wide == 1)
 
 
 @every_space
