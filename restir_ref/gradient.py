@@ -28,8 +28,21 @@ def omega(x: Sample, base: Pixels, y: Shifted, offset: Pixels, proxy: Proxy = ta
 
 def gap(x: Sample, base: Pixels, y: Shifted, offset: Pixels) -> Array:
     """f_i(x) - f_j(T_ij x) J, y = T_ij x; (N,).  [GPT Eq. 2, 15]"""
-    f_base, f_offset = (at.of.contribution(at.index, z)[0] for at, z in ((base, x), (offset, y.x)))
+    f_base, f_offset = (scalar(at.of.contribution(at.index, z)) for at, z in ((base, x), (offset, y.x)))
     return np.asarray(f_base - f_offset * y.J)
+
+
+def scalar(f: Array) -> Array:
+    """The one channel of a contribution (1, N).
+
+    Raises ValueError for more.
+    """
+    if len(f) != 1:
+        raise ValueError(
+            f"gradients are of scalar integrands, but this contribution has {len(f)} channels, of shape {f.shape}: "
+            f"take one channel, or their mean, at a time."
+        )
+    return np.asarray(f[0])
 
 
 def one_sided(X: Reservoirs, base: Pixels, offset: Pixels, proxy: Proxy = target) -> Array:

@@ -14,6 +14,9 @@ from restir_ref.transport.space import Space
 EDGE = 1e-12
 """Simplices are larger by this much of themselves, so that neighbours leave no gap."""
 
+FAR = 1e4
+"""Coordinates reach at most so many times the scene's size: beyond, they are too coarse for what is told apart."""
+
 
 @dataclass(frozen=True)
 class Facet:
@@ -98,8 +101,9 @@ class Scene:
 def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], balls: Sequence[Ball] = ()) -> Scene:
     """Compile a scene.
 
-    Raises ValueError for a scene without light, corners or centres of the wrong shape, degenerate
-    facets, balls without radius, unknown materials, or emission that is negative or of unequal channels.
+    Raises ValueError for a scene without light, too far from the origin, corners or centres of the wrong shape,
+    degenerate facets, balls without radius, unknown materials, emission that is negative or of unequal channels, or
+    two lamps in one place.
     """
     C = _check_scene(space.d, materials, facets, balls)
     corners = np.array([facet.corners for facet in facets], dtype=float)
@@ -166,8 +170,17 @@ def _check_facet(facet: Facet, d: int, channels: int) -> None:
 
 
 def _extent(x: Array) -> float:
-    """The larger of the scene's size and its largest coordinate, of which rounding errors are a share."""
-    return float(max(np.ptp(x, axis=1).max(), np.abs(x).max()))
+    """The larger of the scene's size and its largest coordinate, of which rounding errors are a share.
+
+    Raises ValueError for a scene too far from the origin.
+    """
+    size, reach = float(np.ptp(x, axis=1).max()), float(np.abs(x).max())
+    if reach > FAR * size:
+        raise ValueError(
+            f"the scene is {size:.6g} wide and has coordinates up to {reach:.6g}, more than {FAR:g} times that: "
+            f"rounding errors would show. Move it, and whoever looks at it, to the origin."
+        )
+    return max(size, reach)
 
 
 def _check_lamps(pairs: Array, normals: Array, emission: Array) -> None:
