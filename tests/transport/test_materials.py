@@ -245,6 +245,64 @@ def test_roughness_is_perceptual_zero_for_delta_lobes_and_the_largest_of_what_is
     assert mat.roughest(TABLE, v).tolist() == [1, 1, 0.15, 0.4, 0, 0, 1, 1]
 
 
+# ---------------------------------------------------------------- no more light leaves than arrives
+
+
+def reflects(layers: list[Layer], n: int = 4000) -> float:
+    """Largest share of the light from 40 directions that leaves the plane again: midpoints of all angles."""
+    alone = object.__new__(Material)
+    object.__setattr__(alone, "layers", layers)
+    object.__setattr__(alone, "eta", 1.5)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mat, "check", lambda material, channels: None)
+        t = table([alone], 1)
+    angle, arrives = (np.arange(n) + 0.5) / n * 2 * np.pi, (np.arange(40) + 0.5) / 40 * np.pi / 2
+    o = np.repeat(np.stack([np.sin(arrives), np.cos(arrives)]), n, axis=1)
+    i, N = np.tile(np.stack([np.sin(angle), np.cos(angle)]), 40), 40 * n
+    v = Vertex(0 * o, 0 * o, o, np.zeros(N, dtype=int), np.zeros(N, dtype=int), np.arange(N) % (2 * n) < n)
+    f, _ = mat.evaluate_all(t, SEEING["plane"], v, np.ones((t.L, N)), i)
+    return float(f[0].reshape(40, n).mean(axis=1).max() * 2 * np.pi)
+
+
+def glassy(reflected: float, transmitted: float) -> list[Layer]:
+    return [Layer("rough reflection", (reflected,), 0.4), Layer("rough transmission", (transmitted,), 0.4)]
+
+
+PALE = {
+    "white": [Layer("lambert")],
+    "glossy": [Layer("ggx", (1.0,), 0.3)],
+    "white in three parts": [Layer("lambert", (0.7,)), Layer("lambert", (0.2,)), Layer("ggx", (0.1,), 0.5)],
+    "glass": glassy(1.0, 1.0),
+    "dusty glass": [*glassy(0.6, 0.7), Layer("lambert", (0.3,))],
+    "coated": [Layer("rough reflection", (0.4,), 0.2), Layer("lambert", (0.6,))],
+}
+BRIGHT = {
+    "1.2": [Layer("lambert", (0.7,)), Layer("ggx", (0.5,), 0.5)],
+    "1.4": [Layer("rough reflection", (0.8,), 0.2), Layer("lambert", (0.6,))],
+    "1.3": [*glassy(1.0, 0.9), Layer("lambert", (0.3,))],
+    "1.5": [*glassy(0.9, 1.0), Layer("mirror", (0.5,))],
+}
+
+
+@pytest.mark.parametrize("name", PALE)
+def test_a_material_that_is_accepted_sends_no_more_light_than_arrives(name):
+    mat.check(Material(PALE[name]), 1)
+    assert reflects(PALE[name]) <= 1 + 1e-6
+
+
+@pytest.mark.parametrize("total", BRIGHT)
+def test_colours_that_sum_above_one_are_refused_with_the_material(total):
+    bad = Material(BRIGHT[total])
+    with pytest.raises(ValueError, match="scale them to at most 1") as error:
+        table([Material(PALE["white"]), bad], 1)
+    assert f"the colours of {bad} sum to {total}" in str(error.value)
+
+
+@pytest.mark.parametrize("total", [each for each in BRIGHT if each != "1.5"])
+def test_they_would_send_more_light_than_arrives(total):
+    assert reflects(BRIGHT[total]) > 1.02
+
+
 # ---------------------------------------------------------------- mistakes of users
 
 GOOD = Layer("ggx", (0.5,), 0.5)
