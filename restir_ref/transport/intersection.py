@@ -43,7 +43,7 @@ def intersect(s: "Scene", x: Array, w: Array) -> tuple[Array, Array]:
         x, w = x.take(hit, axis=-1), w.take(hit, axis=-1)
         prim[hit] = foremost(s, x + w / near[hit], prim[hit], w)
     with np.errstate(divide="ignore"):
-        return 1 / near, prim
+        return 1 / np.abs(near), prim  # facets that were missed may have left -0
 
 
 def _blocks(s: "Scene", n: int) -> Iterator[slice]:
