@@ -24,7 +24,10 @@ from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer, Tre
 from restir_ref.transport.restir_pt import PathIntegrals
 
 HYBRID = Connectability(0.2, 0.02)
-"""Roughness .2 and 2% of the scene's size.  [GRIS 8.3]"""
+"""Roughness .2, and 2% of the rooms' height, the unit of length: 1% of the width where that is 2.
+
+[GRIS 8.3] has 1% to 5% of the scene's size.
+"""
 
 RULES: Mapping[str, Connectability] = MappingProxyType({"reconnection": RECONNECTION, "hybrid": HYBRID})
 

@@ -42,8 +42,21 @@ def omega(x: Sample, base: Pixels, y: Shifted, offset: Pixels, proxy: Proxy = ta
 
 def gap(x: Sample, base: Pixels, y: Shifted, offset: Pixels) -> Array:
     """f_i(x) - f_j(T_ij x) J, y = T_ij x; (N,).  [GPT Eq. 2, 15]"""
-    f_base = base.of.contribution(base.index, read_only(x))[0]
-    return np.asarray(f_base - weighted(offset, y.x, y.J)[0])
+    f_base = scalar(base.of.contribution(base.index, read_only(x)))
+    return np.asarray(f_base - scalar(weighted(offset, y.x, y.J)))
+
+
+def scalar(f: Array) -> Array:
+    """The one channel of a contribution (1, N).
+
+    Raises ValueError for more.
+    """
+    if len(f) != 1:
+        raise ValueError(
+            f"gradients are of scalar integrands, but this contribution has {len(f)} channels, of shape {f.shape}: "
+            f"take one channel, or their mean, at a time."
+        )
+    return np.asarray(f[0])
 
 
 def one_sided(X: Reservoirs, base: Pixels, offset: Pixels, proxy: Proxy = target) -> Array:

@@ -18,9 +18,6 @@ from restir_ref.transport.rays import light_pdf, vertex
 from restir_ref.transport.shifts import Prefix, end, reconnect, replay
 from restir_ref.transport.vectors import normalize
 
-SMALL = np.uint8
-"""For k, c and lobes; primitives take 32 bits."""
-
 
 @dataclass(frozen=True)
 class Compact:
@@ -31,7 +28,7 @@ class Compact:
         i = c, sampled by BSDF  the direction leaving x_c
         i = k, end by NEE       light pick 1, light point d-1
         else                    lobe 1, direction d-1
-    k, nee, c, prim, lobe_in, lobe_out (N,)  as in `Path`
+    k, nee, c, prim, lobe_in, lobe_out (N,)  as in `Path`; a byte each, unless depth or lobes need more, prim four
     """
 
     numbers: Array
@@ -50,7 +47,8 @@ def pack(t: Tracer, x: Path) -> Compact:
     slots = np.where(x.nee & (x.k == i), by_vertex[:, 1], by_vertex[:, 0])
     slots = np.where(_goes_on(x, i), x.out, np.where(x.c == i + 1, x.z, slots))
     numbers = np.concatenate([x.u[:first], slots.reshape(-1, len(x.k))])
-    k, c, lobe_in, lobe_out = (each.astype(SMALL) for each in (x.k, x.c, x.lobe_in, x.lobe_out))
+    small = np.min_scalar_type(max(t.depth + 1, t.scene.materials.L - 1))
+    k, c, lobe_in, lobe_out = (each.astype(small) for each in (x.k, x.c, x.lobe_in, x.lobe_out))
     return Compact(numbers, k, x.nee, c, x.prim.astype(np.int32), lobe_in, lobe_out)
 
 

@@ -9,11 +9,13 @@ it, at any angle.
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from restir_ref.batch import Array, ratio, total
+from restir_ref.transport.coincidence import foremost
 from restir_ref.transport.vectors import dot
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ CLEARANCE = 1e-10
 """Heights below this share of the scene's extent are 0."""
 
 BLOCK = 2**15
-"""Simplices times rays to be treated at once: what stays in the cache."""
+"""Simplices times rays to be treated at once: what stays in the cache; never more than 4 times as many."""
 
 # Hazard: glibc gives freed memory back to the system at once, and every temporary array then costs
 # page faults, 5 times the arithmetic.  Once a large array has come and gone (this one is never
@@ -36,14 +38,28 @@ def intersect(s: "Scene", x: Array, w: Array) -> tuple[Array, Array]:
     near, prim = np.empty(x.shape[-1]), np.empty(x.shape[-1], dtype=int)
     for part in _blocks(s, x.shape[-1]):
         near[part], prim[part] = _nearest(s, x[:, part], w[:, part])
+    if s.coincidence.others.size:
+        hit = np.flatnonzero(near)
+        x, w = x.take(hit, axis=-1), w.take(hit, axis=-1)
+        prim[hit] = foremost(s, x + w / near[hit], prim[hit], w)
     with np.errstate(divide="ignore"):
-        return 1 / near, prim
+        return 1 / np.abs(near), prim  # facets that were missed may have left -0
 
 
 def _blocks(s: "Scene", n: int) -> Iterator[slice]:
-    """Slices of the batch axis with about BLOCK / S columns."""
-    step = max(BLOCK // len(s.material), 256)
-    return (slice(at, at + step) for at in range(0, n, step))
+    """Slices of the batch axis: BLOCK / S columns, or 256 if these are more, cut where S times that exceeds 4 BLOCK.
+
+    Narrower ones would cost more by their number than they save in the cache.
+
+    Hazard: BLAS rounds a lone column in another way, so cutting must not leave one.
+    """
+    S = len(s.material)
+    wide, most = max(BLOCK // S, 256), max(4 * BLOCK // S, 3)
+    for at in range(0, n, wide):
+        width = min(wide, n - at)
+        parts = -(-width // most)
+        cuts = [at + width * k // parts for k in range(parts + 1)]
+        yield from (slice(*ends) for ends in pairwise(cuts))
 
 
 def _nearest(s: "Scene", x: Array, w: Array) -> tuple[Array, Array]:

@@ -22,6 +22,7 @@ from restir_ref.transport.reading import ExtendedPath, extended_path
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.shift_checks import NOTHING, Case, Effort, Finding, Numbers, Offender, trials
 from restir_ref.transport.shift_identity import change_of_variables
+from restir_ref.transport.shift_slopes import finite_differences
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "inverse Jacobians": by_path.inverse_jacobians,
         "traced from scratch": by_path.traced_from_scratch,
         "shifted again": by_path.shifted_again,
-        "finite differences": by_path.finite_differences,
+        "finite differences": finite_differences,
         "change of variables": change_of_variables,
     }
 )
@@ -103,6 +104,7 @@ def _lines(t: Tracer, name: str, found: Finding) -> Iterator[str]:
         yield "      undecided: too few paths arrive, or too noisy; give it more paths, or a brighter scene"
         return
     yield f"      {found.failed} of {found.tested} fail, the worst error is {found.worst:.3g} times what is tolerated"
+    yield from (f"      {line}" for line in found.where.splitlines())
     if found.red and found.offender is not None:
         yield from (f"      {line}" for line in path_in_words(t, found.offender))
 

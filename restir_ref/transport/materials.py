@@ -10,6 +10,9 @@ from restir_ref.batch import Array, pick, ratio, take, total
 from restir_ref.transport.lobes import KINDS, LOBES, Lobe
 from restir_ref.transport.space import Space
 
+ROUNDING = 1e-9
+"""By so much colours may sum to more than 1."""
+
 
 @dataclass(frozen=True)
 class Layer:
@@ -121,7 +124,7 @@ def _usual_kind(materials: Sequence[Material], l: int) -> str:
 
 
 def check(material: Material, channels: int) -> None:
-    """Raise ValueError for unknown kinds, impossible roughness, weight or index, and colours beyond [0, 1]."""
+    """Raise ValueError for unknown kinds, impossible roughness, weight or index, and colours or sums beyond [0, 1]."""
     if not any(layer.weight > 0 for layer in material.layers):
         raise ValueError(f"{material} needs a lobe of positive weight; a black one is Layer('lambert', (0.0,)).")
     if not 0 < material.eta < np.inf:
@@ -130,6 +133,23 @@ def check(material: Material, channels: int) -> None:
         _check_layer(layer, channels)
         if layer.kind == "rough transmission" and abs(material.eta - 1) < 1e-3:
             raise ValueError(f"rough transmission needs an index of refraction unlike 1, but it is {material.eta}.")
+    most = float(np.max(_albedo(material)))
+    if most > 1 + ROUNDING:
+        raise ValueError(
+            f"the colours of {material} sum to {most:.6g}, more light than arrives: scale them to at most 1. What is "
+            f"transmitted is not reflected, so of these two the larger one counts."
+        )
+
+
+def _albedo(material: Material) -> Array:
+    """Upper bound of what leaves over what arrives, (C,): reflection and transmission share it, F to 1 - F."""
+    colours = [np.array(layer.colour, dtype=float) for layer in material.layers]
+    ways = [layer.kind.rpartition(" ")[2] for layer in material.layers]
+    reflected, transmitted = (
+        total([colour * (way == each) for colour, way in zip(colours, ways, strict=True)])
+        for each in ("reflection", "transmission")
+    )
+    return np.asarray(total(colours) - np.minimum(reflected, transmitted))
 
 
 def _check_layer(layer: Layer, channels: int) -> None:

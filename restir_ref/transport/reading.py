@@ -124,8 +124,8 @@ def offset_path(t: Tracer, x: ExtendedPath, c: Array, pixel: Array) -> ExtendedP
     seen = np.where(replayed, y.seen, x.seen)
     for j in range(2, len(x.x)):
         here = np.flatnonzero(c == j)
-        start, end = (at[m].take(here, axis=-1) for m in (j - 1, j))
-        w[j - 1][:, here], seen[j - 1, here] = normalize(end - start), t.scene.visible(start, end)
+        start, end, prim = take((at[j - 1], at[j], x.prim[j]), here)
+        w[j - 1][:, here], seen[j - 1, here] = normalize(end - start), t.scene.meets(start, end, prim)
     prim, lobe = np.where(own, y.prim, x.prim), np.where(replayed, y.lobe, x.lobe)
     return ExtendedPath(pixel, x.u, x.k, x.nee, at, w, prim, lobe, seen)
 

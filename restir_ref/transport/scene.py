@@ -7,11 +7,15 @@ import numpy as np
 
 from restir_ref.batch import Array
 from restir_ref.transport import intersection
+from restir_ref.transport.coincidence import Coincidence, coincidence, coincident, foremost
 from restir_ref.transport.materials import Material, Table, table
 from restir_ref.transport.space import Space
 
 EDGE = 1e-12
 """Simplices are larger by this much of themselves, so that neighbours leave no gap."""
+
+FAR = 1e4
+"""Coordinates reach at most so many times the scene's size: beyond, they are too coarse for what is told apart."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,7 @@ class Scene:
     emission: Array
     pdf_area: Array
     lights: Lights
+    coincidence: Coincidence
     extent: float
 
     @property
@@ -87,35 +92,47 @@ class Scene:
         """Whether nothing stands between x and y, (N,)."""
         return intersection.visible(self, x, y)
 
+    def meets(self, x: Array, y: Array, prim: Array) -> Array:
+        """Whether a ray from x meets the primitive at y, of which y is a point, and nothing before; (N,)."""
+        clear = self.visible(x, y)
+        return clear & (foremost(self, y, prim, y - x) == prim) if self.coincidence.others.size else clear
+
 
 def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], balls: Sequence[Ball] = ()) -> Scene:
     """Compile a scene.
 
-    Raises ValueError for a scene without light, corners or centres of the wrong shape, degenerate
-    facets, balls without radius, unknown materials, or emission that is negative or of unequal channels.
+    Raises ValueError for a scene without light, too far from the origin, corners or centres of the wrong shape,
+    degenerate facets, balls without radius, unknown materials, emission that is negative or of unequal channels, or
+    two lamps in one place.
     """
     C = _check_scene(space.d, materials, facets, balls)
     corners = np.array([facet.corners for facet in facets], dtype=float)
     normals, sizes = _normals_and_sizes(corners)
-    emission = np.array([facet.emission or (0.0,) * C for facet in facets] + [(0.0,) * C] * len(balls), dtype=float).T
+    dark = np.zeros(C)
+    emission = np.array([[*facet.emission] or dark for facet in facets] + [dark] * len(balls), dtype=float).T
     share = emission[:, : len(facets)].mean(axis=0) * sizes
     pdf_area = np.append(share / share.sum() / sizes, np.zeros(len(balls)))
     centres = np.array([ball.centre for ball in balls], dtype=float).reshape(-1, space.d).T
     radii = np.array([ball.radius for ball in balls], dtype=float).reshape(-1, 1)
-    everything = np.concatenate([corners.reshape(-1, space.d).T, centres - radii.T, centres + radii.T], axis=1)
+    extent = _extent(np.concatenate([corners.reshape(-1, space.d).T, centres - radii.T, centres + radii.T], axis=1))
+    maps, offsets = _maps(corners, normals)
+    pairs = coincident(corners, maps, offsets, intersection.CLEARANCE * extent)
+    _check_lamps(pairs, normals, emission)
     return Scene(
         space,
         table(materials, C),
         np.moveaxis(corners, 0, -1).copy(),
         normals.T.copy(),
-        *_maps(corners, normals),
+        maps,
+        offsets,
         centres,
         radii,
         np.array([facet.material for facet in facets] + [ball.material for ball in balls]),
         emission,
         pdf_area,
         _lights(corners, normals, emission, pdf_area, share),
-        float(max(np.ptp(everything, axis=1).max(), np.abs(everything).max())),
+        coincidence(pairs, emission.max(axis=0) > 0),
+        extent,
     )
 
 
@@ -150,6 +167,30 @@ def _check_facet(facet: Facet, d: int, channels: int) -> None:
         raise ValueError(
             f"emission must be {channels} finite numbers >= 0, or () for none, but is {facet.emission!r} in {facet}."
         )
+
+
+def _extent(x: Array) -> float:
+    """The larger of the scene's size and its largest coordinate, of which rounding errors are a share.
+
+    Raises ValueError for a scene too far from the origin.
+    """
+    size, reach = float(np.ptp(x, axis=1).max()), float(np.abs(x).max())
+    if reach > FAR * size:
+        raise ValueError(
+            f"the scene is {size:.6g} wide and has coordinates up to {reach:.6g}, more than {FAR:g} times that: "
+            f"rounding errors would show. Move it, and whoever looks at it, to the origin."
+        )
+    return max(size, reach)
+
+
+def _check_lamps(pairs: Array, normals: Array, emission: Array) -> None:
+    """Raise ValueError for two lamps in one place that shine to one side."""
+    for a, b in pairs.T:
+        if emission[:, a].any() and emission[:, b].any() and normals[a] @ normals[b] > 0:
+            raise ValueError(
+                f"facets {min(a, b)} and {max(a, b)} emit to the same side from the same place, and only one can be "
+                f"seen: leave one out, or move it in front of the other."
+            )
 
 
 def _normals_and_sizes(corners: Array) -> tuple[Array, Array]:

@@ -118,13 +118,17 @@ class Offender:
 
 @dataclass(frozen=True)
 class Finding:
-    """How many were tested, broke the law, and may; the worst error in units of what is tolerated, and whose it is."""
+    """How many were tested, broke the law, and may; the worst error in units of what is tolerated, and whose it is.
+
+    where  what else there is to say of those that were tested
+    """
 
     tested: int
     failed: int
     allowed: float
     worst: float
     offender: Offender | None = None
+    where: str = ""
 
     @property
     def red(self) -> bool:
@@ -256,39 +260,3 @@ def shifted_again(case: Case) -> Finding:
 def only(where: Array, quantities: list[Quantity]) -> list[Quantity]:
     """Errors elsewhere do not count."""
     return [replace(each, error=np.where(where, each.error, 0)) for each in quantities]
-
-
-def finite_differences(case: Case) -> Finding:
-    """J = |det du^y / du^x|; where the differences of two steps disagree nothing is decided."""
-    at = take(case.good, spread(case.good.x, case.effort.jacobians))
-    coarse, fine = (stretch(case, at, h) for h in (2 * case.effort.step, case.effort.step))
-    decided = np.flatnonzero(np.abs(fine - coarse) <= DERIVATIVES * np.abs(fine))
-    if 2 * len(decided) < len(fine):
-        return UNDECIDED
-    at, measured = take(at, decided), ((4 * fine - coarse) / 3)[decided]
-    return finding(case, at, [relative("J", at.J, measured, DERIVATIVES)])
-
-
-def spread(x: Path, most: int) -> Array:
-    """At most so many columns, evenly from all kinds (k, nee, c) of paths."""
-    _, kind = np.unique(np.stack([x.k, x.nee, x.c]), axis=1, return_inverse=True)
-    order = np.argsort(kind, kind="stable")
-    first = np.searchsorted(kind[order], kind[order])
-    return np.asarray(order[np.argsort(np.arange(len(order)) - first, kind="stable")][:most])
-
-
-def stretch(case: Case, at: Trial, h: float) -> Array:
-    """|det du^y / du^x| by central differences (N,); NaN where a discrete choice changes within the step."""
-    (D, N), t = at.x.u.shape, case.of.tracer
-    steps = h * np.stack([np.eye(D), -np.eye(D)])  # sign, number
-    u = (at.x.u[:, None, None, :] + np.moveaxis(steps, -1, 0)[..., None]).reshape(D, -1)
-    i, j, k, nee, c = (np.tile(each, 2 * D) for each in (at.i, at.j, at.x.k, at.x.nee, at.x.c))
-    x = traced(t, np.clip(u, 0, 1 - 2**-53), i, k, nee)
-    y, J = case.shift(x, i, j)
-    same = np.flatnonzero((J > 0) & (x.c == c) & ((u >= 0) & (u < 1)).all(axis=0))
-    u_y = np.full_like(u, np.nan)
-    u_y[:, same] = case.u_y(take(x, same), i[same], take(y, same), j[same])
-    plus, minus = np.moveaxis(u_y.reshape(D, 2, D, N), 1, 0)  # number of y, number of x, column
-    matrix = np.moveaxis(plus - minus, -1, 0) / (2 * h)
-    measured = np.abs(np.linalg.det(np.nan_to_num(matrix)))
-    return np.where(np.isnan(matrix).any(axis=(1, 2)), np.nan, measured)

@@ -120,7 +120,7 @@ def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     A = p * z.o[-1] / r ** (space.d - 1) * p_out
     legal &= (A > 0) & (np.minimum(np.abs(local[-1]), z.o[-1]) > GRAZING)
     asked = np.flatnonzero(legal)
-    legal[asked] = s.visible(y.v.x.take(asked, axis=-1), x.z.take(asked, axis=-1))
+    legal[asked] = s.meets(*take((y.v.x, x.z, x.prim), asked))
     return y.T * weight * E, A, legal
 
 

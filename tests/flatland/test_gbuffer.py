@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flatland2d import SCENES
-from flatland2d.gbuffer import alike, gbuffer
+from flatland2d.gbuffer import GBuffer, alike, gbuffer
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.loop import alike_in_row, random_in_row
@@ -37,6 +37,22 @@ def test_pixels_that_see_alike_have_like_normals_and_distances(scene) -> None:
     assert np.einsum("dk,dk->k", g.n[:, i], g.n[:, j]).min() > np.cos(np.radians(25.1))
     assert (np.abs(g.t[i] - g.t[j]) <= 0.1 * g.t[i]).all()
     assert alike(g).diagonal().all()
+
+
+def turned_by(degrees: float, distance: float = 1.0) -> GBuffer:
+    """Two pixels whose normals differ by an angle; the second one's surface is so many times as far away."""
+    a, t = np.radians([40, 40 + degrees]), np.array([2.0, 2.0 * distance])
+    return GBuffer(np.zeros((2, 2)), np.stack([np.cos(a), np.sin(a)]), t, np.zeros(2, dtype=int))
+
+
+@pytest.mark.parametrize(("degrees", "found"), [(0, True), (24.9, True), (-24.9, True), (25.1, False), (-25.1, False)])
+def test_alike_are_normals_within_25_degrees(degrees, found) -> None:
+    assert alike(turned_by(degrees)).tolist() == [[True, found], [found, True]]
+
+
+@pytest.mark.parametrize(("distance", "there", "back"), [(1.09, 1, 1), (1.105, 0, 1), (1.12, 0, 0), (0.91, 1, 1)])
+def test_alike_are_distances_within_a_tenth_of_one_s_own(distance, there, back) -> None:
+    assert alike(turned_by(0, distance)).tolist() == [[True, there], [back, True]]
 
 
 @every_scene

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flatland2d import SCENES, Pinhole
+from flatland2d import PLANE, SCENES, Pinhole
 from flatland2d.motion import Motion, motion, sources
+from flatland2d.scenes import LAMP, chain, matte, room
 from restir_ref.chance import Live
 from restir_ref.transport.rays import arrive
+from restir_ref.transport.scene import scene as compiled
 from tests.flatland.renderings import bias, current, disocclusion, previous
 
 every_scene = pytest.mark.parametrize("scene", SCENES)
@@ -68,6 +70,24 @@ def test_disoccluded_is_what_the_previous_eye_did_not_see_or_the_crop_did_not_ho
     eye = np.broadcast_to(np.array(before.eye)[:, None], m.x.shape)
     shown = SCENES[scene]().scene.visible(eye, m.x) & (m.place >= 0) & (m.place < before.n)
     assert (shown != m.seen).mean() <= EDGE_CASES
+
+
+def shelf(height: float) -> Motion:
+    """A floor seen under the end of a shelf, now from aside, before from above, where the shelf hides it."""
+    facets = [*room(0), *chain([(0.4, height), (0.5, height)], 0), *chain(LAMP, 0, 8.0)]
+    now = Pinhole((0.9, 0.2), (0.5 - 0.5 * height, 0.0), 8, 0.1 * height, film=8)
+    return motion(compiled(PLANE, [matte(0.5)], facets), now, Pinhole((0.5 - 0.5 * height, 0.9), (0.5, 0.0), 8, film=8))
+
+
+@pytest.mark.parametrize("height", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_what_a_thing_hides_was_not_seen_however_close_it_lies_behind_it(height) -> None:
+    m = shelf(height)
+    assert (m.x[1] == pytest.approx(0, abs=1e-3 * height)) & (m.x[0] < 0.5).all()
+    assert not m.seen.any()
+
+
+def test_a_point_within_the_clearance_is_the_same() -> None:
+    assert shelf(1e-11).seen.all()
 
 
 def test_posts_and_the_ends_of_the_film_hide_some_pixels() -> None:

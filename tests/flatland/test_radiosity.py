@@ -12,7 +12,7 @@ from flatland2d.radiosity import cut, gather, render, shares
 from flatland2d.scenes import FURNACE_ALBEDO, INSET, LAMP, Setting, chain, matte, room
 from restir_ref.batch import Array
 from restir_ref.transport import paths
-from restir_ref.transport.materials import Material
+from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, Tracer, trace
 from restir_ref.transport.scene import Facet, Scene
 from restir_ref.transport.scene import scene as compiled
@@ -101,6 +101,14 @@ def test_the_back_of_a_lamp_is_dark() -> None:
     back, front = chain([(0.6, 0.5), (0.4, 0.5)], 1, 8.0), chain([(0.4, 0.5), (0.6, 0.5)], 1, 8.0)
     assert not inside(ABOVE, black, *back).any()
     assert inside(ABOVE, black, *front) == pytest.approx(8.0)
+
+
+def test_lambert_lobes_together_have_the_sum_of_their_albedos() -> None:
+    wide, lamp = replace(ABOVE, half=0.6), chain(LAMP, 0, 8.0)
+    parts = Material([Layer("lambert", (albedo,), weight=albedo) for albedo in (0.1, 0.2, 0.3)])
+    whole, summed, first = (inside(wide, [each], *lamp) for each in (matte(0.6), parts, matte(0.1)))
+    assert summed == pytest.approx(whole, rel=1e-12)
+    assert (first < 0.9 * whole).all()
 
 
 def test_backs_of_walls_are_lit_like_fronts() -> None:

@@ -1,19 +1,24 @@
 """ReSTIR DI against quadrature over the lights: weights that see obstacles are right, 1/M is dark at shadows' edges."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from figures.criteria import all_unbiased, biased, mean_and_blocks, unbiased
 from figures.gris_f15di import shadow_edges
-from flatland2d import SCENES
+from flatland2d import PLANE, SCENES, Pinhole
 from flatland2d.radiosity import cut, gather
+from flatland2d.scenes import LAMP, chain, matte, room
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.loop import random_in_row
 from restir_ref.mis import Weights
 from restir_ref.restir import initial, shade
-from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit, leaves, trace
+from restir_ref.transport.materials import Layer, Material
+from restir_ref.transport.paths import RECONNECTION, Tracer, Tree, first_hit, leaves, radiance, trace
 from restir_ref.transport.restir_di import (
     BIASED,
     CANDIDATES,
@@ -24,6 +29,7 @@ from restir_ref.transport.restir_di import (
     light_integrals,
     lit,
 )
+from restir_ref.transport.scene import scene as compiled
 from tests.flatland.truths import radiosity
 
 PIXELS, REPLICAS, FRAMES, RADIUS = 128, 32, 3, 20
@@ -102,6 +108,35 @@ def test_path_tracing_with_restir_di_agrees_with_radiosity() -> None:
     chance = Live(np.random.default_rng(3))
     ours = np.concatenate([whole_images(t, chance)[0][0].reshape(REPLICAS, -1).mean(axis=1) for _ in range(12)])
     assert unbiased(ours, truth, eps=0.02).passed
+
+
+def left_to_lights(indirect: Callable[[Tree], Array]) -> float:
+    """z of what is left of path tracing, walls being Lambert beside a mirror, against quadrature over the lamp."""
+    facets, eye = [*room(0), *chain(LAMP, 0, 8.0)], Pinhole((0.5, 0.7), (0.45, 0.2), 32, film=32)
+    layers = [Layer("lambert", (0.3,), weight=0.5), Layer("mirror", (0.2,), weight=0.5)]
+    t = Tracer(compiled(PLANE, [Material(layers)], facets), eye, 3, RECONNECTION)
+    truth = quadrature(replace(t, scene=compiled(PLANE, [matte(0.3)], facets))).mean()
+    u, pixel = np.random.default_rng(5).random((t.D, 32 * 1500)), np.arange(32 * 1500) % 32
+    u[0] = CENTRE
+    tree = trace(t, u, pixel)
+    direct = (radiance(tree) - indirect(tree) - tree.T[0] * tree.seen.end)[0].reshape(-1, 32).mean(axis=1)
+    error = direct.std(ddof=1) / np.sqrt(len(direct))
+    assert error < 0.005 * truth
+    return float(abs(direct.mean() - truth) / error)
+
+
+def by_any_leaf(tree: Tree) -> Array:
+    """A mistake: where a mirror was sampled, light sampling is left to the path tracer as well."""
+    by_delta = tree.at[0].p == 0
+    return np.asarray(sum(F if k > 1 else F * by_delta for k, _, F in leaves(tree) if k))
+
+
+def test_beside_a_mirror_light_sampling_stands_for_the_other_lobes_whichever_was_chosen() -> None:
+    assert left_to_lights(lambda tree: indirect_light(tree) - tree.T[0] * tree.seen.end) < 4
+
+
+def test_leaving_it_to_both_is_noticed() -> None:
+    assert left_to_lights(by_any_leaf) > 10
 
 
 @pytest.mark.claims("COM-B08", part="to 2 %")

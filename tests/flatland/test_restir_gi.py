@@ -14,9 +14,11 @@ from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import random_in_row
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, shade, spatial, temporal
-from restir_ref.transport.paths import RECONNECTION, Tracer
-from restir_ref.transport.restir_gi import RadianceIntegrals
+from restir_ref.transport import restir_gi
+from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit
+from restir_ref.transport.restir_gi import RadianceIntegrals, keeps_radiance
 from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.transport.vectors import norm
 from tests.flatland.truths import radiosity
 from tests.transport.paths import HYBRID
 
@@ -115,6 +117,30 @@ def test_restir_gi_is_biased_on_glossy_surfaces() -> None:
 def test_restir_pt_is_not() -> None:
     estimates, truth = glossy("PT", 20)
     assert all_unbiased(estimates, truth, eps=0.02).passed
+
+
+def within_a_wall() -> tuple[Array, Array]:
+    """J of shifts that would connect points of one slanted wall, .01 apart or more, and of all others."""
+    setting, rng, slope = SCENES["crease"](), np.random.default_rng(4), 4
+    t = Tracer(setting.scene, setting.pinhole(1920, 0), setting.depth, RECONNECTION)
+    here, there = (Pixels(RadianceIntegrals(t), each) for each in rng.integers(0, 1920, (2, 40_000)))
+    X = initial(here, Live(rng))
+    J, (v, _, _) = here.of.shift(X.x, here.index, there).J, first_hit(t, X.x.path.u, there.index)
+    asked, same = keeps_radiance(X.x.path) & (X.W > 0) & (v.prim == slope), X.x.path.prim == slope
+    return J[asked & same & (norm(X.x.path.z - v.x) > 0.01)], J[asked & ~same]
+
+
+def test_points_of_one_wall_are_not_connected() -> None:
+    """Their cosines are rounding errors, and so would J be."""
+    within, across = within_a_wall()
+    assert len(within) > 500
+    assert not within.any()
+    assert (across > 0).mean() > 0.3
+
+
+def test_without_a_least_cosine_some_are(monkeypatch) -> None:
+    monkeypatch.setattr(restir_gi, "GRAZING", 0.0)
+    assert within_a_wall()[0].any()
 
 
 def test_restir_gi_connects_at_x_2_only() -> None:

@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from flatland2d import Pinhole
+from restir_ref.chance import Live
+from restir_ref.gradient import gap
 from restir_ref.guards import whole
+from restir_ref.integrals import Pixels, Shifted
+from restir_ref.restir import initial
 from restir_ref.transport.inversion import traced
 from restir_ref.transport.materials import Layer, Material, table
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Tracer, radiance, trace
+from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Ball, Facet, Scene, scene
 from restir_ref.transport.shifts import shift_path
 from tests.core.test_bad_input import Mistake, faults
@@ -168,7 +173,35 @@ SCENES = {
     ),
 }
 
+
+def coloured_gap() -> None:
+    """A difference of pixels in three channels."""
+    s = scene(PLANE, [Material([Layer("lambert", (0.5, 0.4, 0.3))])], [replace(LIGHT, emission=(1.0, 2.0, 3.0))])
+    here = Pixels(PathIntegrals(replace(TRACER, scene=s)), np.arange(8))
+    X = initial(here, Live(np.random.default_rng(1)))
+    gap(X.x, here, Shifted(X.x, np.ones(8)), here)
+
+
+COLOURS_AND_PLACES = {
+    "a coloured gradient": Mistake(
+        coloured_gap, ValueError, "this contribution has 3 channels, of shape (3, 8)", "take one channel, or their mean"
+    ),
+    "a far scene": Mistake(
+        lambda: bare(Facet(((2e4, 0), (2e4, 1))), light=Facet(((2e4 + 1, 1), (2e4 + 1, 0)), 0, (1.0,))),
+        ValueError,
+        "coordinates up to 20001",
+        "to the origin",
+    ),
+    "two lamps in one place": Mistake(
+        lambda: bare(replace(LIGHT, emission=(2.0,))), ValueError, "facets 0 and 1 emit", "leave one out"
+    ),
+    "more colour than light": Mistake(
+        lambda: made_of(Layer("lambert", (0.6,)), Layer("ggx", (0.6,), 0.5)), ValueError, "sum to 1.2", "at most 1"
+    ),
+}
+
 FAMILIES = {
+    **COLOURS_AND_PLACES,
     **DEPTHS,
     **RULES,
     **SAMPLES,
@@ -214,6 +247,10 @@ NEAR_MISSES = {
     "a short segment": seen(bare(Facet(((0.5, 0.5), (0.5 + 1e-9, 0.5))))),
     "a small ball": seen(bare(balls=[Ball((0.5, 0.5), 1e-6)])),
     "the last material": seen(bare(replace(PLAIN, material=1), materials=[MATTE, MATTE])),
+    "a scene of a far corner": seen(bare(Facet(((1e4, 0), (1e4, 1))))),
+    "a lamp in a wall": seen(bare(replace(LIGHT, emission=()))),
+    "a lamp with two sides": seen(bare(Facet(LIGHT.corners[::-1], 0, (1.0,)))),
+    "all colour there is": seen(made_of(Layer("lambert", (0.7,)), Layer("ggx", (0.2,), 0.5), Layer("mirror", (0.1,)))),
     "two walls in one place": seen(bare(PLAIN, PLAIN)),
 }
 

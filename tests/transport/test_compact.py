@@ -9,7 +9,8 @@ from flatland2d import SCENES
 from restir_ref import Live, Pixels, initial, shade, spatial
 from restir_ref.batch import Array, ratio
 from restir_ref.transport.compact import Compact, pack, unpack
-from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.inversion import traced
+from restir_ref.transport.paths import Connectability, Path, Tracer
 from restir_ref.transport.reading import extended_path, factors
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.shifts import shift_path
@@ -96,6 +97,41 @@ def test_a_reservoir_in_flatland_takes_no_more_than_the_paper_s_88_bytes() -> No
     whole = nbytes(path) + nbytes(factors(s.t, path))
     assert (whole, nbytes(s.x), nbytes(pack(s.t, s.x))) == (694, 209, 65)
     assert nbytes(pack(s.t, s.x)) + 16 <= 88
+
+
+def deep_paths(depth: int, n: int = 30) -> tuple[Tracer, Path, Array]:
+    """Paths of up to `depth` vertices in a bright room, few of which connect."""
+    setting, rng, pixel = SCENES["furnace"](), np.random.default_rng(39), np.full(n, 900)
+    t = Tracer(setting.scene, setting.pinhole(1920, 0), depth, Connectability(0, 1.38))
+    k = depth - np.arange(n) % 10
+    return t, traced(t, rng.random((t.D, n)), pixel, k, rng.random(n) < 0.5), pixel
+
+
+def integers(x: Path | Compact) -> Array:
+    """k and c, (2, N)."""
+    return np.stack([x.k, x.c])
+
+
+DEPTHS = (127, 128, 254, 255, 300)
+
+
+@pytest.mark.claims("GRIS-A17")
+@pytest.mark.parametrize("depth", DEPTHS)
+def test_a_path_of_any_depth_can_be_stored(depth) -> None:
+    t, x, pixel = deep_paths(depth)
+    again = stored(t, x, pixel)
+    assert (integers(again) == integers(x)).all()
+    assert shift_difference(t, x, again, pixel) < 1e-9
+    last = replace(x, c=x.k + 1)
+    assert (integers(pack(t, last)) == integers(last)).all()
+    assert pack(t, x).k.dtype.itemsize == (1 if depth < 255 else 2)
+
+
+@pytest.mark.parametrize(("dtype", "depth"), [(np.int8, 127), (np.int8, 128), (np.uint8, 255), (np.uint8, 300)])
+def test_an_integer_that_wraps_is_noticed(dtype, depth) -> None:
+    t, x, _ = deep_paths(depth)
+    last = replace(x, c=x.k + 1)
+    assert (integers(pack(t, last)).astype(dtype) != integers(last)).any()
 
 
 # ---------------------------------------------------------------- twins

@@ -69,7 +69,7 @@ def showroom(roughness: float) -> Setting:
             [Layer(f"{kind}reflection", (1.0,), roughness), Layer(f"{kind}transmission", (1.0,), roughness)], eta
         )
 
-    coated = Material([Layer("lambert", (0.5,)), Layer("ggx", (0.5,), roughness), Layer("mirror", (0.3,))])
+    coated = Material([Layer("lambert", (0.4,)), Layer("ggx", (0.3,), roughness), Layer("mirror", (0.3,))])
     materials = [glass("rough ", 1.5), glass("glass ", 1.5), glass("rough ", 0.7), coated]
     boxes = [*block((0.15, 0), (0.4, 0.5), 0), *block((0.6, 0), (0.85, 0.28), 1), *block((0.4, 0.5), (0.5, 0.6), 2)]
     balls = [Ball((0.5, 0.2), 0.1, 0), Ball((0.5, 0.4), 0.1, 1), Ball((0.2, 0.8), 0.2, 2)]

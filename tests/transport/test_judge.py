@@ -1,5 +1,6 @@
 """The judge acquits our shifts, in d = 2, 3 and 4, and convicts planted bugs; which check sees which is pinned."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -11,6 +12,7 @@ from flatland2d.scenes import LAMP, Setting, chain, matte, room
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Shifted
+from restir_ref.transport import shift_slopes
 from restir_ref.transport.copies import COPIES, Copying, unit_stretch
 from restir_ref.transport.inversion import traced
 from restir_ref.transport.judge import CHECKS, Judgement, Shifting, judge, report
@@ -181,6 +183,40 @@ def test_half_vectors_taken_for_directions_are_convicted_but_for_mirrors_in_flat
     assert SLOPE in judged(taken_for_a_direction(furnished("solid", REPLAY))).red
     assert SLOPE in judged(taken_for_a_direction(tracer("frosted", REPLAY))).red
     assert not judged(taken_for_a_direction(tracer("glossy_cornell", REPLAY))).red
+
+
+# Mistakes that few paths show.
+
+
+def clamped(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
+    """J clamped to [.1, 10] both ways, so that J_ij J_ji = 1."""
+    y, J = shift_path(t, x, pixel)
+    return y, np.where(J > 0, np.clip(J, 0.1, 10), 0)
+
+
+@pytest.mark.claims("GRIS-A11")
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("setting", ["glossy_cornell", "crease"])
+def test_jacobians_clamped_both_ways_are_convicted_though_hardly_any_path_shows_it(setting, seed):
+    t = tracer(setting, HYBRID)
+    found = judge(Shifting(t, clamped), Live(np.random.default_rng(seed)), checks={SLOPE: CHECKS[SLOPE]})
+    assert found.red == (SLOPE,)
+    assert found.findings[SLOPE].where.startswith("J tested from 0.1 to ")
+
+
+def test_paths_taken_evenly_from_all_kinds_do_not_show_it(monkeypatch):
+    monkeypatch.setattr(shift_slopes, "EXTREMES", 0)
+    monkeypatch.setattr(shift_slopes, "stratum", lambda J: np.zeros(len(J), dtype=int))
+    t = tracer("crease", HYBRID)
+    assert not judge(Shifting(t, clamped), Live(np.random.default_rng(1)), checks={SLOPE: CHECKS[SLOPE]}).red
+
+
+def test_the_report_says_which_jacobians_were_tested():
+    of, chance = PathIntegrals(tracer("glossy_cornell", HYBRID)), Live(np.random.default_rng(1))
+    text = report(judge(of, chance, THOROUGH, checks={SLOPE: CHECKS[SLOPE]}))
+    (low, high), (least, most) = (map(float, each) for each in re.findall(r"from ([\d.e-]+) to ([\d.e-]+)", text))
+    assert least <= low < 0.001
+    assert 5 < high <= most
 
 
 # Refusals, and a stranger's function.

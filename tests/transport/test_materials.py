@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from restir_ref.batch import Array, take
@@ -22,7 +22,9 @@ MATERIALS = {
     "rough glass": Material([Layer("rough reflection", RGB, 0.4), Layer("rough transmission", (1, 1, 0.5), 0.4)], 1.6),
     "glass": Material([Layer("glass reflection", RGB, 0.0), Layer("glass transmission", (1, 0.9, 1), 0.0)]),
     "mirror": Material([Layer("mirror", RGB)]),
-    "coated": Material([Layer("rough reflection", (1, 1, 1), 0.2), Layer("lambert", RGB), Layer("ggx", RGB, 0.7)]),
+    "coated": Material(
+        [Layer("rough reflection", (0.3, 0.2, 0.3), 0.2), Layer("lambert", RGB), Layer("ggx", (0.4, 0.1, 0.3), 0.7)]
+    ),
     "black": Material([Layer("lambert", (0, 0, 0))]),
 }
 TABLE = table(list(MATERIALS.values()), 3)
@@ -87,16 +89,42 @@ def test_absent_and_black_lobes_are_never_chosen_where_others_are(space):
 shares = st.lists(st.sampled_from([0.0, 0.1, 0.5, 1.0, 3.0]), min_size=3, max_size=3).filter(any)
 
 
-@given(shares, shares, st.floats(0, 1, exclude_max=True))
-def test_the_copied_lobe_s_number_chooses_it_again_and_comes_back(x, y, u):
+def rounding(P_x: Array, P_y: Array, lobe: int) -> float:
+    """Numbers at x are known to 4 eps; at y that is P_y / P_x times as much, and 4 eps more."""
+    return float(4 * np.finfo(float).eps * (1 + P_y[lobe, 0] / P_x[lobe, 0]))
+
+
+def copies(choose_number, x: list[float], y: list[float], u: float) -> bool:
+    """Whether the number chosen at y chooses the lobe of u at x, if both have it, and comes back to u."""
     P_x, P_y = (np.array(P)[:, None] / sum(P) for P in (x, y))
-    u = np.array([u])
-    lobe = mat.choose_lobe(P_x, u)
-    if P_x[lobe[0], 0] > 0 and P_y[lobe[0], 0] > 0:
-        number = mat.choose_number(P_x, P_y, lobe, u)
-        inside = np.clip(number, 1e-15, 1 - 1e-15)
-        assert mat.choose_lobe(P_y, inside) == lobe or np.abs(number - np.cumsum(P_y, axis=0)).min() < 1e-15
-        assert mat.choose_number(P_y, P_x, lobe, number) == pytest.approx(u, abs=1e-15)
+    (lobe,) = mat.choose_lobe(P_x, np.array([u]))
+    if not (P_x[lobe, 0] > 0 and P_y[lobe, 0] > 0):
+        return True
+    number = choose_number(P_x, P_y, np.array([lobe]), np.array([u]))
+    close = rounding(P_x, P_y, lobe)
+    at_edge = np.abs(number - np.cumsum(P_y, axis=0)).min() < close
+    chosen_again = at_edge or mat.choose_lobe(P_y, np.clip(number, close, 1 - close)) == lobe
+    back = choose_number(P_y, P_x, np.array([lobe]), number)
+    return bool(chosen_again and abs(back[0] - u) < rounding(P_y, P_x, lobe))
+
+
+@given(shares, shares, st.floats(0, 1, exclude_max=True))
+@example([0.5, 3.0, 0.0], [3.0, 0.1, 0.0], 0.21875)
+@example([0.0, 0.1, 0.0], [3.0, 0.1, 0.0], 0.3125)
+def test_the_copied_lobe_s_number_chooses_it_again_and_comes_back(x, y, u):
+    assert copies(mat.choose_number, x, y, u)
+
+
+WRONG_NUMBERS = {
+    "kept": lambda P_x, P_y, lobe, u: u,
+    "anywhere in the interval": lambda P_x, P_y, lobe, u: np.cumsum(P_y, axis=0)[lobe, 0] - 0.5 * P_y[lobe, 0],
+    "off by a hair": lambda P_x, P_y, lobe, u: mat.choose_number(P_x, P_y, lobe, u) + 1e-14,
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG_NUMBERS)
+def test_another_number_is_noticed(wrong):
+    assert not copies(WRONG_NUMBERS[wrong], [0.5, 1.0, 0.0], [1.0, 0.5, 0.0], 0.4)
 
 
 def test_lobes_are_chosen_as_often_as_their_shares_say():
@@ -215,6 +243,64 @@ def test_roughness_is_perceptual_zero_for_delta_lobes_and_the_largest_of_what_is
     first = mat.lobe_roughness(TABLE, v, np.zeros(len(MATERIALS), dtype=int))
     assert first.tolist() == [1, 1, 0.15, 0.4, 0, 0, 0.2, 1]
     assert mat.roughest(TABLE, v).tolist() == [1, 1, 0.15, 0.4, 0, 0, 1, 1]
+
+
+# ---------------------------------------------------------------- no more light leaves than arrives
+
+
+def reflects(layers: list[Layer], n: int = 4000) -> float:
+    """Largest share of the light from 40 directions that leaves the plane again: midpoints of all angles."""
+    alone = object.__new__(Material)
+    object.__setattr__(alone, "layers", layers)
+    object.__setattr__(alone, "eta", 1.5)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mat, "check", lambda material, channels: None)
+        t = table([alone], 1)
+    angle, arrives = (np.arange(n) + 0.5) / n * 2 * np.pi, (np.arange(40) + 0.5) / 40 * np.pi / 2
+    o = np.repeat(np.stack([np.sin(arrives), np.cos(arrives)]), n, axis=1)
+    i, N = np.tile(np.stack([np.sin(angle), np.cos(angle)]), 40), 40 * n
+    v = Vertex(0 * o, 0 * o, o, np.zeros(N, dtype=int), np.zeros(N, dtype=int), np.arange(N) % (2 * n) < n)
+    f, _ = mat.evaluate_all(t, SEEING["plane"], v, np.ones((t.L, N)), i)
+    return float(f[0].reshape(40, n).mean(axis=1).max() * 2 * np.pi)
+
+
+def glassy(reflected: float, transmitted: float) -> list[Layer]:
+    return [Layer("rough reflection", (reflected,), 0.4), Layer("rough transmission", (transmitted,), 0.4)]
+
+
+PALE = {
+    "white": [Layer("lambert")],
+    "glossy": [Layer("ggx", (1.0,), 0.3)],
+    "white in three parts": [Layer("lambert", (0.7,)), Layer("lambert", (0.2,)), Layer("ggx", (0.1,), 0.5)],
+    "glass": glassy(1.0, 1.0),
+    "dusty glass": [*glassy(0.6, 0.7), Layer("lambert", (0.3,))],
+    "coated": [Layer("rough reflection", (0.4,), 0.2), Layer("lambert", (0.6,))],
+}
+BRIGHT = {
+    "1.2": [Layer("lambert", (0.7,)), Layer("ggx", (0.5,), 0.5)],
+    "1.4": [Layer("rough reflection", (0.8,), 0.2), Layer("lambert", (0.6,))],
+    "1.3": [*glassy(1.0, 0.9), Layer("lambert", (0.3,))],
+    "1.5": [*glassy(0.9, 1.0), Layer("mirror", (0.5,))],
+}
+
+
+@pytest.mark.parametrize("name", PALE)
+def test_a_material_that_is_accepted_sends_no_more_light_than_arrives(name):
+    mat.check(Material(PALE[name]), 1)
+    assert reflects(PALE[name]) <= 1 + 1e-6
+
+
+@pytest.mark.parametrize("total", BRIGHT)
+def test_colours_that_sum_above_one_are_refused_with_the_material(total):
+    bad = Material(BRIGHT[total])
+    with pytest.raises(ValueError, match="scale them to at most 1") as error:
+        table([Material(PALE["white"]), bad], 1)
+    assert f"the colours of {bad} sum to {total}" in str(error.value)
+
+
+@pytest.mark.parametrize("total", [each for each in BRIGHT if each != "1.5"])
+def test_they_would_send_more_light_than_arrives(total):
+    assert reflects(BRIGHT[total]) > 1.02
 
 
 # ---------------------------------------------------------------- mistakes of users

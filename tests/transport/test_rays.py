@@ -1,5 +1,7 @@
 """Rays against a reference that solves linear systems, and where floating point is most likely to go astray."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,22 @@ def test_blocks_of_rays_are_a_matter_of_speed_only(space, monkeypatch):
     whole = (*intersect(s, x, w), visible(s, x, w))
     monkeypatch.setattr(intersection, "BLOCK", 1)
     assert all((a == b).all() for a, b in zip(whole, (*intersect(s, x, w), visible(s, x, w)), strict=True))
+
+
+def blocks(simplices: int, n: int) -> list[slice]:
+    return [*intersection._blocks(SimpleNamespace(material=range(simplices)), n)]
+
+
+@pytest.mark.parametrize("simplices", [1, 20, 128, 129, 700, 5000, 40_000])
+def test_no_block_exceeds_the_cache_and_none_is_a_lone_column_that_need_not_be(simplices):
+    wide = max(intersection.BLOCK // simplices, 256)
+    for n in (0, 1, 2, 3, 7, 255, 257, 1000, 70_001):
+        found = blocks(simplices, n)
+        assert [k for each in found[:100] for k in range(n)[each]] == [*range(found[:100][-1].stop if n else 0)]
+        widths = [each.stop - each.start for each in found]
+        assert sum(widths) == n
+        assert simplices * max(widths, default=0) <= 4 * intersection.BLOCK
+        assert widths.count(1) == (n % wide == 1)
 
 
 @every_space
@@ -138,9 +156,65 @@ def test_a_direction_of_length_zero_meets_nothing_and_makes_no_warning(space):
 
 
 @every_space
+def test_a_ray_that_meets_nothing_goes_to_plus_infinity(space):
+    s, x, w = room(space), 5 + somewhere(space.d, 1000, 11), directions(space.d, 1000, 12)
+    away = np.where((w * (x - simplex(space.d).mean(axis=0)[:, None])).sum(axis=0) > 0, w, -w)
+    t, prim = intersect(s, x, away)
+    assert (t == np.inf).all()
+    assert (prim == 0).all()
+
+
+@every_space
 def test_every_point_sees_itself(space):
     s, x = soup(space, 1), somewhere(space.d, 1000, 12)
     assert visible(s, x, x).all()
+
+
+# ---------------------------------------------------------------- what is on a surface
+
+
+def hair_off_a_wall(space: Space, gap: float) -> tuple[Array, Array]:
+    """Whether rays from points so far off a wall, in units of the extent, meet it, and whether it hides its other side.
+
+    Far from the wall's edges, where another wall would.
+    """
+    s, n = room(space), 1000
+    b = 0.5 / space.d + 0.5 * np.random.default_rng(8).dirichlet(np.ones(space.d), n).T
+    x, out = s.corners[..., 0].T @ b, s.normals[:, :1]
+    start = x + gap * s.extent * out
+    t, prim = intersect(s, start, np.repeat(-out, n, axis=1))
+    return (prim == 0) & (t < 2 * gap * s.extent), ~visible(s, start, x - 1e-3 * out)
+
+
+def hair_off_a_ball(space: Space, gap: float, side: int) -> tuple[Array, Array]:
+    """The same for a ball, from outside (side 1) or inside (-1)."""
+    s, out = bowl(space, 0.2, 0.3), directions(space.d, 1000, 17)
+    start = 0.2 + (0.3 + side * gap * s.extent) * out
+    t, _ = intersect(s, start, -side * out)
+    return t < 2 * gap * s.extent, ~visible(s, start, 0.2 + (0.3 - side * 0.01) * out)
+
+
+@every_space
+@pytest.mark.parametrize("gap", [1e-8, 1e-9, 1.5 * CLEARANCE])
+def test_what_lies_farther_off_a_surface_than_the_clearance_is_off_it(space, gap):
+    for found in (hair_off_a_wall(space, gap), hair_off_a_ball(space, gap, 1), hair_off_a_ball(space, gap, -1)):
+        assert all(each.all() for each in found)
+
+
+@every_space
+@pytest.mark.parametrize("gap", [0.0, 1e-14, 1e-12, 0.5 * CLEARANCE])
+def test_what_lies_nearer_is_on_it(space, gap):
+    for found in (hair_off_a_wall(space, gap), hair_off_a_ball(space, gap, 1), hair_off_a_ball(space, gap, -1)):
+        assert not any(each.any() for each in found)
+
+
+@pytest.mark.parametrize("clearance", [1e-7, 1e-13])
+def test_another_clearance_is_noticed(clearance, monkeypatch):
+    monkeypatch.setattr(intersection, "CLEARANCE", clearance)
+    sides = [hair_off_a_wall(SPACES["solid"], 1e-9)[0], hair_off_a_ball(SPACES["solid"], 1e-9, 1)[0]]
+    if clearance < CLEARANCE:
+        sides = [hair_off_a_wall(SPACES["solid"], 1e-12)[0], hair_off_a_ball(SPACES["solid"], 1e-12, 1)[0]]
+    assert [each.any() for each in sides] == [clearance < CLEARANCE] * 2
 
 
 # ---------------------------------------------------------------- symmetry

@@ -6,8 +6,20 @@ from math import factorial
 import numpy as np
 import pytest
 
+from flatland2d import PLANE, Pinhole
+from flatland2d.scenes import LAMP, boxes, chain, mixed
+from flatland2d.scenes import room as square
+from restir_ref.batch import Array
+from restir_ref.chance import Live
+from restir_ref.transport import scene as scenes
+from restir_ref.transport.intersection import CLEARANCE
+from restir_ref.transport.judge import judge, report
 from restir_ref.transport.materials import Layer, Material
-from restir_ref.transport.scene import EDGE, Ball, Facet, scene
+from restir_ref.transport.paths import Tracer, radiance, trace
+from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.transport.scene import EDGE, FAR, Ball, Facet, scene
+from restir_ref.transport.shift_checks import Effort
+from tests.transport.paths import HYBRID
 from tests.transport.rooms import MATTE, soup, walls
 from tests.transport.spaces import SPACES
 
@@ -57,6 +69,65 @@ def test_a_scene_moved_and_scaled_has_the_same_normals_and_lights(space, k):
     assert np.allclose(a.normals, b.normals, atol=1e-12)
     assert np.allclose(a.lights.upto, b.lights.upto)
     assert np.allclose(a.pdf_area, b.pdf_area * k ** (space.d - 1))
+
+
+def cornell_at(at: tuple[float, float]) -> Tracer:
+    """The glossy box, turned, with its left floor corner at a place."""
+    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    there = lambda x: tuple((turn @ np.array(x) + at).tolist())  # noqa: E731
+    facets = [*square(0), *boxes(1), *chain(LAMP, 0, 8.0)]
+    moved = [replace(facet, corners=[there(corner) for corner in facet.corners]) for facet in facets]
+    s = scene(PLANE, [mixed(0.5, 0.5, 0.2), mixed(0.3, 0.15, 0.5)], moved)
+    return Tracer(s, Pinhole(there((0.5, 0.7)), there((0.45, 0.2)), 1920, film=1920), 3, HYBRID)
+
+
+def image(t: Tracer) -> Array:
+    pixel = np.arange(1920 * 2) % 1920
+    return radiance(trace(t, np.random.default_rng(4).random((t.D, len(pixel))), pixel))
+
+
+PLACES = ((100.0, -70.0), (-0.9 * FAR, 0.6 * FAR))
+
+
+@pytest.mark.parametrize("at", PLACES)
+def test_a_moved_scene_renders_the_same_and_its_shifts_are_right(at):
+    t, there = cornell_at((0.0, 0.0)), cornell_at(at)
+    unlike = np.abs(image(there) - image(t)) > 1e-4 * image(t)
+    assert unlike.mean() < 1e-3  # rays that pass an edge by less than the rounding of places
+    assert image(there).mean() == pytest.approx(image(t).mean(), rel=1e-4)
+    found = judge(PathIntegrals(there), Live(np.random.default_rng(1)), Effort(paths=5000, jacobians=80))
+    assert not found.red, report(found)
+
+
+def test_a_scene_beyond_the_limit_is_refused_where_its_shifts_would_be_wrong(monkeypatch):
+    far = (30 * FAR, 20 * FAR)
+    with pytest.raises(ValueError, match=r"coordinates up to 300001, more than 10000 times that.*Move it"):
+        cornell_at(far)
+    monkeypatch.setattr(scenes, "FAR", np.inf)
+    t = cornell_at(far)
+    assert "inverse Jacobians" in judge(PathIntegrals(t), Live(np.random.default_rng(1)), Effort(paths=5000)).red
+
+
+@every_space
+@pytest.mark.parametrize("at", [0.0, 100.0, -0.9 * FAR])
+def test_rounding_is_as_small_a_share_of_the_clearance_wherever_a_scene_stands(space, at):
+    moved = [replace(f, corners=(np.array(f.corners) + at).tolist(), emission=(1.0,)) for f in walls(space.d)]
+    s, b = scene(space, [MATTE], moved), np.random.default_rng(5).dirichlet(np.ones(space.d), 1000)
+    for k in range(s.S):
+        height = np.abs(s.maps[-s.S :][k] @ (s.corners[..., k].T @ b.T) + s.offsets[-s.S :][k])
+        assert height.max() < 2e-5 * CLEARANCE * s.extent
+
+
+@every_space
+def test_arrays_are_as_good_as_lists(space):
+    lists = [replace(facet, emission=(1.0, 2.0) if k else ()) for k, facet in enumerate(walls(space.d))]
+    arrays = [Facet(np.array(facet.corners), 0, np.array(facet.emission)) for facet in lists]
+    dark = [replace(facet, emission=np.zeros(2)) if not len(facet.emission) else facet for facet in arrays]
+    paint, ball = Material([Layer("lambert", np.array([0.5, 0.3]))]), Ball(np.zeros(space.d), np.array(0.1))
+    a = scene(space, [paint], lists, [replace(ball, centre=(0.0,) * space.d)])
+    for other in (arrays, dark):
+        b = scene(space, np.array([paint], dtype=object), other, [ball])
+        assert all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("corners", "emission", "pdf_area"))
 
 
 # ---------------------------------------------------------------- mistakes of users
