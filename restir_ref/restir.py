@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from restir_ref.batch import Array, take, total
+from restir_ref.batch import Array, take, total, wide
 from restir_ref.chance import Chance
 from restir_ref.guards import nonnegative, per_column
 from restir_ref.integrals import Pixels, Reservoirs, Sample, target
@@ -91,7 +91,7 @@ def capped(X: Reservoirs, cap: float) -> Reservoirs:
     """Confidence c <- min(c, M_c); needs cap > 0, for a null confidence is biased.  [GRIS 6.4]"""
     if not cap > 0:
         raise ValueError(f"the cap M_c must be positive, but is {cap!r}; leave temporal reuse out instead.")
-    return replace(X, c=np.minimum(X.c, cap))
+    return replace(X, c=np.minimum(wide(X.c), cap))
 
 
 def around(X: Reservoirs, neighbours: Sequence[Pixels]) -> list[Input]:
