@@ -75,7 +75,7 @@ def constant(i: int, q: Density, c: Confidences) -> Array:
 
 def one_over_z(i: int, q: Density, c: Confidences) -> Array:
     """1{q_i > 0} c_i / Z, Z = sum_j c_j 1{q_j > 0}: the contribution weight of [Bitterli 2020].  [GRIS Eq. 17]"""
-    realises = [np.where(q(j) > 0, c[j], 0) for j in range(len(c))]
+    realises = [c[j] * (q(j) > 0) for j in range(len(c))]
     return ratio(realises[i], total(realises))
 
 

@@ -93,7 +93,7 @@ NUMBERS = {
         "weight W of input 1",
         SOURCES,
     ),
-    "own confidence": (lambda bad: reuse_all(replace(X, c=bad), HERE, []), "confidence c of input 0", SOURCES),
+    "own confidence": (lambda bad: reuse_all(replace(X, c=bad), HERE, [RIGHT]), "confidence c of input 0", SOURCES),
     "confidence of an input": (
         lambda bad: gris([Input(X, HERE), Input(replace(X, c=bad), RIGHT)], HERE, TALBOT, live()),
         "confidence c of input 1",
