@@ -14,7 +14,8 @@ def nonnegative(values: Array, what: str, remedy: str) -> Array:
     """
     if not values.size or (values.dtype != object and values.min() >= 0 and values.max() < np.inf):
         return values
-    bad = np.atleast_1d(~((values >= 0) & (values < np.inf)))
+    with np.errstate(invalid="ignore"):
+        bad = np.atleast_1d(~((values >= 0) & (values < np.inf)))
     if not bad.any():  # of exact numbers, among which min() may overlook a NaN
         return values
     where = tuple(int(k) for k in np.argwhere(bad)[0])

@@ -96,7 +96,9 @@ def alike_in_row(alike: Array) -> Around:
 def _moved(of: Image, index: Array, u: Array, radius: float) -> Pixels:
     """u in [0, 1) chooses one of the steps -radius .. -1, 1 .. radius, and mirrors make a wave of period 2 (n - 1)."""
     if not 1 <= radius < np.inf:
-        raise ValueError(f"neighbours are 1 .. radius pixels away, but the radius is {radius}: take 1, or no neighbours.")
+        raise ValueError(
+            f"neighbours are 1 .. radius pixels away, but the radius is {radius}: take 1, or no neighbours."
+        )
     reach = int(radius)
     step = np.floor(u * 2 * reach).astype(int) - reach
     pixel = index % of.n

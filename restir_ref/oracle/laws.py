@@ -72,6 +72,6 @@ def _compare(together: Reservoirs, alone: Reservoirs, n: int) -> None:
     x, W = together.x[-n:], together.W[-n:]
     if not (np.array_equal(x, alone.x) and (abs(W - alone.W) <= 1e-9 * abs(alone.W)).all()):
         raise ValueError(
-            f"a lane alone gives samples {alone.x} with weights {alone.W}, but {x} with {W} beside other lanes: columns "
-            "are independent replicas, so never sum or index across them but within index - index % n + pixel."
+            f"a lane alone gives samples {alone.x} with weights {alone.W}, but {x} with {W} beside other lanes: "
+            "columns are independent replicas, so never sum or index across them but within index - index % n + pixel."
         )

@@ -118,6 +118,7 @@ def test_confidences_that_wrap_are_biased(monkeypatch):
     whole, wrapped = (spatially(stored(kind, 250), WEIGHTS["talbot"]) for kind in ("float64", "uint8"))
     assert not same_bits(whole, wrapped)
 
+
 # ---------------------------------------------------------------- targets and weights
 
 
@@ -141,7 +142,7 @@ every_selector = pytest.mark.parametrize("selector", SELECTORS.values(), ids=SEL
 def test_weights_that_float32_cannot_hold_are_held_all_the_same(selector):
     p_hat, mW = tiny()
     chosen = selector([Candidate(X.x, p_hat, mW)] * 2, live(), X.c)
-    assert chosen.W == pytest.approx(2 * mW.astype(float), rel=1e-12)
+    assert pytest.approx(2 * mW.astype(float), rel=1e-12) == chosen.W
     assert (p_hat * mW == 0).all()
 
 
