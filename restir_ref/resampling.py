@@ -197,7 +197,7 @@ def _check_covered(i: int, w: Array, q: Density, c: Confidences) -> None:
     lost = (c[i] == 0) & (w > 0) & (total([c[j] * q(j) for j in range(len(c))]) == 0)
     if np.any(lost):
         raise ValueError(
-            f"input {i} has confidence 0 in column {int(np.argmax(lost))}, but no other can have a sample like its own, "
+            f"input {i} has confidence 0 in column {int(np.argmax(lost))}, but no other can have a sample like it, "
             "which would be lost: give it, or another input that covers supp p_hat, a positive confidence."
         )
 
