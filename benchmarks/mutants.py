@@ -56,10 +56,10 @@ EQUIVALENT = {
     "mis._pair: ...canonical[{0 => -1}]...": SAME_DENSITY,
     "mis._canonical_share: ...canonical[{0 => -1}]...": SAME_DENSITY,
     "resampling: ONE = {np.array(1) => 1}": "a factor of 1, as an array or not",
-    "resampling.gris: ...minimum({total(...), LARGEST_CONFIDENCE => LARGEST_CONFIDENCE, ...": COMMUTES,
+    "resampling.gris: ...minimum({C, LARGEST_CONFIDENCE => LARGEST_CONFIDENCE, C}))": COMMUTES,
     "resampling._densities.q: ...inputs[{i => j}]...": "i = j in this branch",
     "resampling._check_input: for ...source.X.c), ('weight W', source.X.W})):": "which of two mistakes is named first",
-    "restir.capped: ...minimum({X.c, cap => cap, X.c})...": COMMUTES,
+    "restir.capped: ...minimum({wide(X.c), cap => cap, wide(X.c)}))": COMMUTES,
 }
 """Mutants that compute the same, with the reason; `...` stands for anything."""
 

@@ -94,6 +94,11 @@ def ratio(a: Array, b: Array) -> Array:
     return np.asarray(a / (b + null) * ~null)
 
 
+def wide(values: Array) -> Array:
+    """The same numbers in 64 bits, where bytes would wrap and float32 underflow; exact types (object) stay exact."""
+    return values.astype(np.promote_types(values.dtype, np.int64), copy=False)
+
+
 def total(terms: Sequence[Array]) -> Array:
     """Sum of at least one array, added left to right without a zero to start from."""
     return reduce(add, terms)

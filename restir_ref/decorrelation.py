@@ -46,7 +46,8 @@ Acceptance = Callable[[Move], Array]
 
 def metropolis(move: Move) -> Array:
     """a = min(1, p_hat(x') T(x' -> x) / (p_hat(x) T(x -> x'))).  [MCMC 3.2.1]"""
-    # erratum: the printed formula lacks the minimum, without which detailed balance holds only at ratio 1.
+    # erratum: the printed a lacks the minimum, and is no probability above 1.  Compared with a uniform u < a it
+    # needs none, since u < 1; where a itself counts, as in detailed balance, in `choose` or in expectations, it does.
     return ratio(np.minimum(move.p_hat_new * move.T_ratio, move.p_hat), move.p_hat)
 
 
@@ -119,8 +120,8 @@ class Blue:
     luminance (N,) is that of the columns before the mutations; `neighbours` are arrays (N,) of columns,
     `distances` their distances in pixels.
 
-    # erratum: [MCMC 4.2] prints no min(1, .), and says that keeping T outside the weighted average
-    # guarantees detailed balance; it does not for any w_bn > 0.
+    # erratum: [MCMC 4.2] says that keeping T outside the weighted average guarantees detailed balance;
+    # it does not for any w_bn > 0.  It prints no min(1, .) either, see `metropolis`.
     Hazard: w_bn > 0 does not leave p_hat invariant, so W is
     biased; and in grey pixels, whose luminance p_hat W cannot change, a_bn is always 1.
     """

@@ -168,7 +168,7 @@ class TossedPairs(Pairs):
     """Pairs whose candidates live on one side at a time."""
 
     def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Paired, Array]]:
-        """The candidates of i or j by the toss of a coin, whose probability 1/2 enters W.  [GPT 4.2]"""
+        """The candidates of i or j by the toss of a coin, whose probability 1/2 enters W.  [ours; GPT 4.2]"""
         k = chance.choose(np.ones((2, len(index))))
         for x, mW in self.based(index, k, chance):
             yield x, 2 * mW

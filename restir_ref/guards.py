@@ -16,12 +16,15 @@ def nonnegative(values: Array, what: str, remedy: str) -> Array:
 
     Raises ValueError naming the first offending value and its column.
     """
-    if values.dtype == object or not values.size or (values.min() >= 0 and values.max() < np.inf):
+    if not values.size or (values.dtype != object and values.min() >= 0 and values.max() < np.inf):
         return values
-    bad = ~((values >= 0) & (values < np.inf))
+    with np.errstate(invalid="ignore"):
+        bad = np.atleast_1d(~((values >= 0) & (values < np.inf)))
+    if not bad.any():  # of exact numbers, among which min() may overlook a NaN
+        return values
     where = tuple(int(k) for k in np.argwhere(bad)[0])
     raise ValueError(
-        f"{what} must be finite and non-negative, but is {values[where]!s} in column {where[-1]} "
+        f"{what} must be finite and non-negative, but is {np.atleast_1d(values)[where]!s} in column {where[-1]} "
         f"({int(bad.sum())} of {values.size} values are bad). {remedy}"
     )
 

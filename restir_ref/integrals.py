@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array, columns, take
+from restir_ref.batch import Array, columns, take, wide
 from restir_ref.chance import Chance
 from restir_ref.guards import aligned, nonnegative, per_column, read_only
 
@@ -99,7 +99,7 @@ class Reservoirs:
 
 def target(at: Pixels, x: Sample) -> Array:
     """p_hat(x) of the integrals `at`, checked: (N,), finite and >= 0."""
-    p_hat = per_column(np.asarray(at.of.target(at.index, read_only(x))), len(at.index), "the target p_hat")
+    p_hat = per_column(wide(np.asarray(at.of.target(at.index, read_only(x)))), len(at.index), "the target p_hat")
     return nonnegative(p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target().")
 
 
@@ -110,7 +110,7 @@ Proxy = Callable[[Pixels, Sample], Array]
 def pdf(at: Pixels, x: Sample) -> Array:
     """p(x), checked: for integrals that also know the density of their candidates; (N,)."""
     of: Tractable = at.of  # type: ignore[assignment]
-    p = per_column(np.asarray(of.pdf(at.index, read_only(x))), len(at.index), "the density p")
+    p = per_column(wide(np.asarray(of.pdf(at.index, read_only(x)))), len(at.index), "the density p")
     return nonnegative(p, "the density p", "Return the density of the candidates from pdf().")
 
 

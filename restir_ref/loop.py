@@ -65,6 +65,7 @@ def random_in_row(of: Image, index: Array, count: int, radius: float, chance: Ch
     """Neighbours uniform in -radius .. radius of a row of n pixels, mirrored at its ends.
 
     Within radius / 2 of an end a mirrored one can be the pixel itself, which is unbiased, only no news.
+    Rows shorter than the radius are mirrored at both ends in turn.  Raises ValueError for a radius below 1.
     """
     return [_moved(of, index, u, radius) for u in chance.uniform((count, len(index)))]
 
@@ -94,10 +95,13 @@ def alike_in_row(alike: Array) -> Around:
 
 
 def _moved(of: Image, index: Array, u: Array, radius: float) -> Pixels:
-    """u in [0, 1) chooses one of the steps -radius .. -1, 1 .. radius."""
+    """u in [0, 1) chooses one of the steps -radius .. -1, 1 .. radius, and mirrors make a wave of period 2 (n - 1)."""
+    if not 1 <= radius < np.inf:
+        raise ValueError(
+            f"neighbours are 1 .. radius pixels away, but the radius is {radius}: take 1, or no neighbours."
+        )
     reach = int(radius)
     step = np.floor(u * 2 * reach).astype(int) - reach
     pixel = index % of.n
-    place = np.abs(pixel + step + (step >= 0))
-    mirrored = of.n - 1 - np.abs(of.n - 1 - place)
-    return Pixels(of, index - pixel + np.clip(mirrored, 0, of.n - 1))
+    place = (pixel + step + (step >= 0)) % max(2 * (of.n - 1), 1)
+    return Pixels(of, index - pixel + np.minimum(place, 2 * (of.n - 1) - place))

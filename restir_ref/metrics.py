@@ -24,7 +24,7 @@ REPLICAS = 64
 
 def mape(image: Array, reference: Array) -> Array:
     """mean |I - R| / (.01 mean R + R): free of the images' scale; (..., n) -> (...).  [GRIS 9.3, footnote 13]"""
-    return np.asarray((abs(image - reference) / (SMALL * reference.mean() + reference)).mean(axis=-1))
+    return np.asarray((abs(image - reference) / (SMALL * _mean(reference) + reference)).mean(axis=-1))
 
 
 def mape_with_floor(image: Array, reference: Array) -> Array:
@@ -34,12 +34,17 @@ def mape_with_floor(image: Array, reference: Array) -> Array:
 
 def rel_mse(image: Array, reference: Array) -> Array:
     """mean (I - R)^2 / (R^2 + (.01 mean R)^2); (..., n) -> (...)."""
-    return np.asarray(((image - reference) ** 2 / (reference**2 + (SMALL * reference.mean()) ** 2)).mean(axis=-1))
+    return np.asarray(((image - reference) ** 2 / (reference**2 + (SMALL * _mean(reference)) ** 2)).mean(axis=-1))
 
 
 def rmse(image: Array, reference: Array) -> Array:
     """sqrt(mean (I - R)^2); (..., n) -> (...)."""
     return np.asarray(np.sqrt(((image - reference) ** 2).mean(axis=-1)))
+
+
+def _mean(reference: Array) -> Array:
+    """The mean of every reference of its own, (..., 1)."""
+    return np.asarray(reference.mean(axis=-1, keepdims=True))
 
 
 # ---------------------------------------------------------------- many images of the same
@@ -90,7 +95,7 @@ def box_covariance(images: Array, reference: Array, radius: int = 8, axes: Axes 
     d = images - images.mean(axis=over, keepdims=True)
     c = (d * (_box_sum(d, radius, axes) - d)).sum(axis=over) / (K - 1)
     others = _box_sum(np.ones_like(c), radius, axes) - 1
-    return np.asarray(ratio(c, others).mean(axis=axes) / reference.mean() ** 2)
+    return np.asarray(ratio(c, others).mean(axis=axes) / reference.mean(axis=axes) ** 2)
 
 
 def _box_sum(values: Array, radius: int, axes: Axes) -> Array:

@@ -26,16 +26,23 @@ Density = Callable[[int], Array]
 
 @dataclass(frozen=True)
 class Confidences:
-    """Confidences c[j] of all inputs, each (N,), and which of the inputs are canonical."""
+    """Confidences c[j] of all inputs, each (N,), and which of the inputs are canonical.
+
+    Engines count in bytes, whose sums and products wrap: what is read from here is a float, or exact.
+    """
 
     c: Sequence[Array]
     canonical: Sequence[int]
 
     def __getitem__(self, j: int) -> Array:
-        return self.c[j]
+        return self._numbers[j]
 
     def __len__(self) -> int:
         return len(self.c)
+
+    @cached_property
+    def _numbers(self) -> Sequence[Array]:
+        return [each.astype(np.result_type(each, float), copy=False) for each in self.c]
 
     @cached_property
     def others(self) -> Sequence[int]:
@@ -45,7 +52,7 @@ class Confidences:
     @cached_property
     def C(self) -> Array:
         """Confidence of all inputs together."""
-        return total(self.c)
+        return total(self._numbers)
 
     @cached_property
     def C_R(self) -> Array:
@@ -68,7 +75,7 @@ def constant(i: int, q: Density, c: Confidences) -> Array:
 
 def one_over_z(i: int, q: Density, c: Confidences) -> Array:
     """1{q_i > 0} c_i / Z, Z = sum_j c_j 1{q_j > 0}: the contribution weight of [Bitterli 2020].  [GRIS Eq. 17]"""
-    realises = [np.where(q(j) > 0, c[j], 0) for j in range(len(c))]
+    realises = [c[j] * (q(j) > 0) for j in range(len(c))]
     return ratio(realises[i], total(realises))
 
 
@@ -115,7 +122,7 @@ def _canonical_share(q: Density, c: Confidences) -> Array:
     return total([ratio(c[j] * p_hat, _pair(j, q, c)) for j in c.others])
 
 
-ANY = "any inputs"
+ANY = "inputs that cover supp p_hat, those of confidence 0 not counted"
 CANONICAL_COVERS = "inputs with a canonical one that covers supp p_hat"
 ALL_CANONICAL = "inputs that can all realise the same samples"
 
@@ -124,7 +131,8 @@ ALL_CANONICAL = "inputs that can all realise the same samples"
 class Weights:
     """Resampling weights m_i with the contribution weights c_i that go with them.  [GRIS Eq. 16-21]
 
-    `c` is None where c_i = m_i.  `unbiased_for` says for which inputs the pair is exactly unbiased.
+    `c` is None where c_i = m_i.  `unbiased_for` says for which inputs the pair is exactly unbiased:
+    what only a sample of confidence 0 could realise is lost, as if its input were not there.
     `proxy` is the density that q compares: p_hat, or `pdf` where all inputs have known densities
     [GRIS 5.6, tractable PDFs].
     """

@@ -6,18 +6,21 @@ RIS and GRIS are the same lines: `select` does not know whether its candidates c
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 
 import numpy as np
 
-from restir_ref.batch import Array, pick, ratio, total
+from restir_ref.batch import Array, pick, ratio, total, wide
 from restir_ref.chance import Chance
 from restir_ref.guards import aligned, apart, nonnegative, per_column
 from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, p_hat_from, shifted, target
-from restir_ref.mis import CANONICAL_COVERS, Confidences, Density, Weights
+from restir_ref.mis import ALL_CANONICAL, CANONICAL_COVERS, Confidences, Density, Weights
 
 LARGEST_CONFIDENCE = 2.0**100
 """Merged confidences saturate here, so that uncapped ones, which double every frame, stay finite."""
+
+TOO_LARGE = "Scale p_hat: a constant factor changes no estimate, but keeps p_hat, W and their sums in range."
 
 ONE = np.array(1)
 """The Jacobian of the identity."""
@@ -33,7 +36,7 @@ class Input:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A sample y where we select, p_hat(y), m W (with J), and c_i/m_i (None if 1); each (N,)."""
+    """A sample y where we select, p_hat(y), m W (with J), and c_i/m_i (None is 1, for each on its own); each (N,)."""
 
     x: Sample
     p_hat: Array
@@ -53,6 +56,8 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
         q = _densities(i, y, p_hat, inputs, here, mis.proxy)
         m = mis.m(i, q, c)
         c_over_m = None if mis.c is None else ratio(mis.c(i, q, c), m)
+        if mis.unbiased_for != ALL_CANONICAL:
+            _check_covered(i, (c[i] == 0) & (source.X.W * y.J * p_hat > 0), q, c)
         yield Candidate(y.x, p_hat, m * source.X.W * y.J, c_over_m)
 
 
@@ -61,32 +66,39 @@ def contribution_weight(y: Candidate) -> Array:
     return y.mW if y.c_over_m is None else y.c_over_m * y.mW
 
 
+def correction(y: Candidate) -> Array:
+    """c_i/m_i of one candidate, which is 1 unless the weights differ; (N,)."""
+    return np.ones_like(y.mW) if y.c_over_m is None else y.c_over_m
+
+
 def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservoirs:
     """Choose Y by w_i = p_hat(Y_i) m_i W_i J_i; W_Y = (c_s/m_s) sum_j w_j / p_hat(Y).  [GRIS Eq. 21-22]
 
     Where all w_i are 0 the result is a null sample: the first candidate with W = 0, and the
-    confidence c (N,) all the same.  Raises ValueError for no candidates or negative, NaN or
-    infinite weights.
+    confidence c (N,) all the same.  Raises ValueError for no candidates, for negative, NaN or
+    infinite weights, and where their sum or W_Y overflows.
     """
     offered = list(candidates)
-    w = _resampling_weights([each.p_hat * each.mW for each in offered])
+    w = _stacked([resampling_weight(each) for each in offered])
+    w_sum = sum_of_weights(w.sum(axis=0))
     s = chance.choose(w)
-    W = ratio(w.sum(axis=0), pick([each.p_hat for each in offered], s))
-    corrections = [each.c_over_m for each in offered if each.c_over_m is not None]
-    if corrections:
-        W = W * pick(corrections, s)
+    W = over_target(w_sum, pick([each.p_hat for each in offered], s))
+    if any(each.c_over_m is not None for each in offered):
+        W = W * pick([correction(each) for each in offered], s)
     return Reservoirs(pick([each.x for each in offered], s), W, np.broadcast_to(c, W.shape))
 
 
 def select_any(ys: Sequence[Sample], cW: Sequence[Array], w: Sequence[Array], chance: Chance, c: Array) -> Reservoirs:
-    """W_Y = c_s W_s J_s (sum_j w_j / w_s) for *any* w_i > 0: the general form.  [GRIS Eq. 16]
+    """W_Y = c_s W_s J_s (sum_j w_j / w_s) for *any* w_i > 0: the general form.  [GRIS Eq. 18]
 
     cW holds c_i W_i J_i, where the contribution weights c_i sum to 1 over the inputs that can realise
     y [GRIS Eq. 17]; w (M, N) must be positive wherever c_i W_i J_i f is not 0.  `select` is the case
     w_i = p_hat m_i W_i J_i.
     """
-    s = chance.choose(_resampling_weights(w))
-    W = pick(cW, s) * ratio(total(w), pick(w, s))
+    stacked = _checked(_stacked(w))
+    w_sum = sum_of_weights(total(w))
+    s = chance.choose(stacked)
+    W = pick(cW, s) * ratio(w_sum, pick(w, s))
     return Reservoirs(pick(ys, s), W, np.broadcast_to(c, W.shape))
 
 
@@ -97,25 +109,37 @@ def gris(inputs: Sequence[Input], here: Pixels, mis: Weights, chance: Chance) ->
     caps the history when it comes in.  Both are unbiased.
     """
     chosen = list(weigh(inputs, here, mis))
-    return select(chosen, chance, np.minimum(total([each.X.c for each in inputs]), LARGEST_CONFIDENCE))
+    C = Confidences(_counts(inputs), ()).C
+    return select(chosen, chance, np.minimum(C, LARGEST_CONFIDENCE))
 
 
-def resampling_weight(w: Array) -> Array:
-    """w_i = p_hat m_i W_i, checked: finite and >= 0."""
-    return nonnegative(
-        w,
-        "a resampling weight w_i = p_hat m_i W_i",
-        "Check the m W of the candidates and the MIS weights m_i.",
-    )
+def resampling_weight(y: Candidate) -> Array:
+    """w_i = p_hat m_i W_i, checked: finite and >= 0; (N,)."""
+    return _checked(wide(y.p_hat) * y.mW)
 
 
-def _resampling_weights(w: Sequence[Array]) -> Array:
-    """All w_i, (M, N), checked; at least one."""
+def sum_of_weights(w_sum: Array) -> Array:
+    """sum_j w_j (N,), checked: no sum of finite weights may overflow."""
+    return nonnegative(w_sum, "the sum of the resampling weights w_i", TOO_LARGE)
+
+
+def over_target(w_sum: Array, p_hat: Array) -> Array:
+    """sum_j w_j / p_hat(Y) (N,), checked: finite."""
+    return nonnegative(ratio(w_sum, p_hat), "the weight W_Y = sum_j w_j / p_hat(Y)", TOO_LARGE)
+
+
+def _checked(w: Array) -> Array:
+    what = "a resampling weight w_i = p_hat m_i W_i"
+    return nonnegative(w, what, "Check the m W of the candidates and the MIS weights m_i.")
+
+
+def _stacked(w: Sequence[Array]) -> Array:
+    """All w_i, (M, N); at least one."""
     if not w:
         raise ValueError(
             "resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input."
         )
-    return resampling_weight(np.stack(np.broadcast_arrays(*w)))
+    return np.stack(np.broadcast_arrays(*w))
 
 
 def _landed(inputs: Sequence[Input], here: Pixels) -> Iterator[tuple[Input, Shifted, Array]]:
@@ -164,13 +188,32 @@ def _confidences(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Confide
     for i, source in enumerate(inputs):
         _check_input(source, len(here.index), f"input {i}")
     canonical = [i for i, source in enumerate(inputs) if source.at is here]
-    c = Confidences([source.X.c for source in inputs], canonical)
+    c = Confidences(_counts(inputs), canonical)
     if mis.unbiased_for == CANONICAL_COVERS and not (canonical and np.all(c.C_R > 0)):
         raise ValueError(
             "pairwise weights need a canonical input of positive confidence in every column (|R| = 0): "
             "pass one whose `at` is the Pixels object of the pass, and keep the confidence of null samples."
         )
     return c
+
+
+def _counts(inputs: Sequence[Input]) -> list[Array]:
+    """All confidences; beside exact numbers they become fractions, since the ratio of two integers is a float."""
+    if not any(object in (each.X.W.dtype, each.X.c.dtype) for each in inputs):
+        return [each.X.c for each in inputs]
+    return [np.vectorize(Fraction, otypes=[object])(each.X.c) for each in inputs]
+
+
+def _check_covered(i: int, uncounted: Array, q: Density, c: Confidences) -> None:
+    """Raise ValueError where Y_i, of confidence 0 and w_i > 0, lies where no input that counts can have a sample."""
+    if not np.any(uncounted):
+        return
+    lost = uncounted & (total([c[j] * q(j) for j in range(len(c))]) == 0)
+    if np.any(lost):
+        raise ValueError(
+            f"input {i} has confidence 0 in column {int(np.argmax(lost))}, but no other can have a sample like it, "
+            "which would be lost: give it, or another input that covers supp p_hat, a positive confidence."
+        )
 
 
 def _check_input(source: Input, n: int, name: str) -> None:

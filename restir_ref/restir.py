@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from restir_ref.batch import Array, total
+from restir_ref.batch import Array, total, wide
 from restir_ref.chance import Chance
 from restir_ref.guards import apart, nonnegative, per_column, positive, whole
 from restir_ref.integrals import NOWHERE, Pixels, Reservoirs, Sample, held, pixels, target, weighted
@@ -100,7 +100,7 @@ def shade(X: Reservoirs, here: Pixels) -> Array:
 def capped(X: Reservoirs, cap: float) -> Reservoirs:
     """Confidence c <- min(c, M_c); needs cap > 0, for a null confidence is biased.  [GRIS 6.4]"""
     positive(cap, "the cap M_c", "leave temporal reuse out instead.")
-    return replace(X, c=np.minimum(X.c, cap))
+    return replace(X, c=np.minimum(wide(X.c), cap))
 
 
 def around(X: Reservoirs, neighbours: Sequence[Pixels]) -> list[Input]:

@@ -4,14 +4,14 @@ The result has exactly the distribution of `resampling.select`; only the stored 
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio, where
+from restir_ref.batch import Array, where
 from restir_ref.chance import Chance
 from restir_ref.integrals import Reservoirs
-from restir_ref.resampling import Candidate, resampling_weight
+from restir_ref.resampling import Candidate, correction, over_target, resampling_weight, sum_of_weights
 
 
 @dataclass(frozen=True)
@@ -24,24 +24,28 @@ class Stream:
 
 def offer(stream: Stream, new: Candidate, chance: Chance) -> Stream:
     """Add w to w_sum *first*, then keep the new candidate with probability w / w_sum."""
-    w = resampling_weight(new.p_hat * new.mW)
+    w = resampling_weight(new)
+    w_sum = sum_of_weights(stream.w_sum + w)
     replaced = chance.choose(np.stack(np.broadcast_arrays(stream.w_sum, w))) == 1
-    return Stream(where(replaced, new, stream.kept), stream.w_sum + w)
+    return Stream(where(replaced, _corrected(new), _corrected(stream.kept)), w_sum)
 
 
 def select_streaming(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservoirs:
     """As `resampling.select`, without holding more than one candidate.  [GRIS Eq. 21-22]
 
-    Raises ValueError for no candidates.
+    Raises ValueError as it does.
     """
     stream = None
     for new in candidates:
-        stream = Stream(new, resampling_weight(new.p_hat * new.mW)) if stream is None else offer(stream, new, chance)
+        stream = Stream(new, resampling_weight(new)) if stream is None else offer(stream, new, chance)
     if stream is None:
         raise ValueError(
             "resampling needs at least one candidate (M = 0): yield one from candidates(), or pass an input."
         )
-    W = ratio(stream.w_sum, stream.kept.p_hat)
-    if stream.kept.c_over_m is not None:
-        W = W * stream.kept.c_over_m
+    W = over_target(stream.w_sum, stream.kept.p_hat) * correction(stream.kept)
     return Reservoirs(stream.kept.x, W, np.broadcast_to(c, W.shape))
+
+
+def _corrected(y: Candidate) -> Candidate:
+    """The candidate with its c_i/m_i written out, so that it can be merged with any other."""
+    return replace(y, c_over_m=correction(y))

@@ -21,9 +21,13 @@ def reasonable(f: Array, p_hat: Array) -> Array:
 
 
 def limit_variance(f: Array, p_hat: Array, v: Array) -> Array:
-    """Var[f(X) / p_bar(X)] = ||p_hat|| int f^2 / p_hat - (int f)^2, X ~ p_bar; (..., K) -> (...).  [GRIS Eq. 28]"""
-    norm = (p_hat * v).sum(axis=-1)
-    return np.asarray(norm * (ratio(f**2, p_hat) * v).sum(axis=-1) - (f * v).sum(axis=-1) ** 2)
+    """Var[f(X) / p_bar(X)] = ||p_hat|| int f^2 / p_hat - (int f)^2, X ~ p_bar; (..., K) -> (...).  [GRIS Eq. 28]
+
+    Infinite where f > 0 = p_hat, as C_f is: no number of samples finds that part.
+    """
+    norm, missed = (p_hat * v).sum(axis=-1), ((p_hat == 0) & (f > 0)).any(axis=-1)
+    finite = norm * (ratio(f**2, p_hat) * v).sum(axis=-1) - (f * v).sum(axis=-1) ** 2
+    return np.where(missed, np.inf, finite)
 
 
 def excess_bound(C_f: Numbers, V: Numbers, norm: Numbers, constant: float = PRINTED) -> Array:

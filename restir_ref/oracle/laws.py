@@ -11,7 +11,7 @@ import numpy as np
 
 from restir_ref.batch import Array
 from restir_ref.integrals import Reservoirs
-from restir_ref.oracle.enumeration import MOST_LEAVES, Program, outcomes
+from restir_ref.oracle.enumeration import MOST_LEAVES, Enumerating, Program, outcomes
 
 Label = Callable[[Array], Array]
 
@@ -48,5 +48,30 @@ def bias_per_cell(E: Array, v: Array, support: Array) -> Array:
 
 
 def bias_of(program: Program[Reservoirs], v: Array, support: Array) -> Array:
-    """Exact relative bias per cell of a program whose samples are cell numbers; (n, K)."""
-    return bias_per_cell(expected_weight(program, v), v, support)
+    """Exact relative bias per cell of a program whose samples are cell numbers; (n, K).
+
+    Raises ValueError if lanes leak into one another: what a leak does depends on which lanes are run together.
+    """
+    return bias_per_cell(expected_weight(_watched(program, len(v)), v), v, support)
+
+
+def _watched(program: Program[Reservoirs], n: int) -> Program[Reservoirs]:
+    """The program, whose last lane must do alone what it does beside the others."""
+
+    def watched(index: Array, chance: Enumerating) -> Reservoirs:
+        X = program(index, chance)
+        if chance.calls == len(chance.answers) and len(index) > n:
+            _compare(X, program(index[:n], Enumerating([answers[-1:] for answers in chance.answers])), n)
+        return X
+
+    return watched
+
+
+def _compare(together: Reservoirs, alone: Reservoirs, n: int) -> None:
+    """Raise ValueError where the last lane differs from itself alone by more than rounding."""
+    x, W = together.x[-n:], together.W[-n:]
+    if not (np.array_equal(x, alone.x) and (abs(W - alone.W) <= 1e-9 * abs(alone.W)).all()):
+        raise ValueError(
+            f"a lane alone gives samples {alone.x} with weights {alone.W}, but {x} with {W} beside other lanes: "
+            "columns are independent replicas, so never sum or index across them but within index - index % n + pixel."
+        )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -93,7 +94,7 @@ NUMBERS = {
         "weight W of input 1",
         SOURCES,
     ),
-    "own confidence": (lambda bad: reuse_all(replace(X, c=bad), HERE, []), "confidence c of input 0", SOURCES),
+    "own confidence": (lambda bad: reuse_all(replace(X, c=bad), HERE, [RIGHT]), "confidence c of input 0", SOURCES),
     "confidence of an input": (
         lambda bad: gris([Input(X, HERE), Input(replace(X, c=bad), RIGHT)], HERE, TALBOT, live()),
         "confidence c of input 1",
@@ -116,6 +117,25 @@ def test_a_bad_number_is_named_with_its_column_and_a_remedy(act, what, remedy, v
 def test_zeros_and_large_numbers_are_no_mistakes(act, what, remedy):
     for fine in (0.0, 5e-324, 1e150):
         act(at(2, fine))
+
+
+EXACT = {"negative": Fraction(-1, 2), "NaN": NAN, "infinite": INF}
+
+
+@pytest.mark.parametrize("value", EXACT.values(), ids=EXACT)
+@pytest.mark.parametrize(("act", "what", "remedy"), NUMBERS.values(), ids=NUMBERS)
+def test_a_bad_number_among_fractions_is_named_too(act, what, remedy, value):
+    def with_third(third):
+        act(np.array([Fraction(1), Fraction(1, 3), third, Fraction(2)], dtype=object))
+
+    assert faults(Mistake(lambda: with_third(value), ValueError, "in column 2 (1 of", f". {remedy}")) == []
+    with_third(Fraction(1, 2))
+
+
+def test_a_bad_number_that_all_columns_share_is_named():
+    assert (
+        faults(Mistake(lambda: nonnegative(np.array(-0.5), "J", "Return |J|."), ValueError, "J must", "Return")) == []
+    )
 
 
 # ---------------------------------------------------------------- shapes and numbers of things

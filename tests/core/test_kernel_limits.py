@@ -131,6 +131,29 @@ def test_bad_weights_are_refused_wherever_they_stand(selector, bad, place):
         selector(offered(*mW), live(), X.c)
 
 
+LARGE = np.full(N, 1.5e308)
+TOO_LARGE = {
+    "sum of weights": (np.ones(N), LARGE, "the sum of the resampling weights w_i"),
+    "W": (np.full(N, 1e-9), LARGE, "the weight W_Y = sum_j w_j / p_hat"),
+}
+
+
+@pytest.mark.parametrize("selector", [select, select_streaming])
+@pytest.mark.parametrize(("p_hat", "mW", "what"), TOO_LARGE.values(), ids=TOO_LARGE)
+def test_what_overflows_is_refused_by_name(selector, p_hat, mW, what):
+    selector([Candidate(X.x, p_hat, mW / 4)] * 2, live(), X.c)
+    with (
+        np.errstate(over="ignore"),
+        pytest.raises(ValueError, match=rf"^{what}.* but is inf in column 0 .* Scale p_hat"),
+    ):
+        selector([Candidate(X.x, p_hat, mW)] * 2, live(), X.c)
+
+
+def test_weights_of_any_kind_may_not_overflow_together():
+    with np.errstate(over="ignore"), pytest.raises(ValueError, match=r"^the sum of the resampling weights w_i must"):
+        select_any([X.x] * 2, [X.W] * 2, [LARGE] * 2, live(), X.c)
+
+
 class Dark(Wrapped):
     """Integrals whose target is zero everywhere."""
 

@@ -10,7 +10,7 @@ from flatland2d.scenes import Setting
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Reservoirs
-from restir_ref.loop import OFFLINE, REAL_TIME, Around, Preset, frame, random_in_row, spread_in_row
+from restir_ref.loop import OFFLINE, REAL_TIME, Around, Preset, _moved, frame, random_in_row, spread_in_row
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, spatial, temporal
 from tests.core.stubs import live
@@ -136,6 +136,46 @@ def test_neighbours_of_a_radius_beyond_the_row_are_pixels_of_it(around, n):
     found = steps(around, n, 6, 20, pixel) + pixel
     assert (found // n == pixel // n).all()
     assert set(found.ravel() % n) == set(range(n))
+
+
+def mirrored_to(pixel: int, n: int, radius: int) -> Array:
+    """Where the steps -radius .. radius but 0 lead in a row that goes on in mirrors, sorted; (2 radius,)."""
+    row = np.pad(np.arange(n), radius, mode="reflect")[pixel : pixel + 2 * radius + 1]
+    return np.sort(np.delete(row, radius))
+
+
+def every_step(n: int, radius: int, pixel: int) -> Array:
+    """The neighbours that all equally likely numbers choose, sorted; (2 radius,)."""
+    u = (np.arange(2 * radius) + 0.5) / (2 * radius)
+    return np.sort(_moved(Row(n), np.full(2 * radius, pixel), u, radius).index)  # type: ignore[arg-type]
+
+
+ROWS = [(2, 1), (2, 5), (5, 20), (8, 7), (8, 14), (8, 20), (64, 20)]
+
+
+@pytest.mark.parametrize(("n", "radius"), ROWS)
+def test_a_row_goes_on_in_mirrors_however_far_the_radius_reaches(n, radius):
+    for pixel in range(n):
+        assert (every_step(n, radius, pixel) == mirrored_to(pixel, n, radius)).all()
+
+
+def test_mirroring_once_and_staying_at_the_end_draws_one_pixel_of_eight_with_a_share_of_38_percent():
+    steps = np.delete(np.arange(-20, 21), 20)
+    once = np.clip(7 - abs(7 - abs(7 + steps)), 0, 7)
+    assert np.bincount(once).max() / 40 == pytest.approx(0.375)
+    assert max(np.bincount(every_step(8, 20, pixel)).max() for pixel in range(8)) / 40 <= 0.15
+
+
+@each_choice
+@pytest.mark.parametrize("radius", [0, 0.5, -3, np.nan, np.inf])
+def test_a_radius_that_reaches_no_other_pixel_is_refused_by_name(around, radius):
+    with pytest.raises(ValueError, match=rf"the radius is {radius}: take 1"):
+        steps(around, 100, 3, radius, np.arange(100))
+
+
+@each_choice
+def test_a_radius_of_one_reaches_the_next_pixels(around):
+    assert set(steps(around, 100, 3, 1.5, np.full(50, 50)).ravel()) == {-1, 1}
 
 
 PRESET = Preset(trees=3, rounds=2, neighbours=2, radius=3, cap=1.5, along="1/Z", across="talbot")

@@ -51,6 +51,18 @@ def test_of_the_two_mapes_only_one_depends_on_the_scale_of_the_image():
 
 
 @pytest.mark.parametrize("metric", HAND, ids=lambda metric: metric.__name__)
+def test_stacked_references_are_scaled_by_their_own_means(metric):
+    apart = [metric(IMAGE, R), metric(100 * IMAGE, 30 * R)]
+    assert metric(np.stack([IMAGE, 100 * IMAGE]), np.stack([R, 30 * R])) == pytest.approx(np.array(apart), rel=1e-12)
+
+
+def test_a_mean_that_stacked_references_share_is_noticed():
+    both, shared = np.stack([R, 30 * R]), np.full((2, 1), np.stack([R, 30 * R]).mean())
+    found = (abs(np.stack([IMAGE, 100 * IMAGE]) - both) / (0.01 * shared + both)).mean(axis=-1)
+    assert abs(found / mape(np.stack([IMAGE, 100 * IMAGE]), both) - 1).max() > 0.01
+
+
+@pytest.mark.parametrize("metric", HAND, ids=lambda metric: metric.__name__)
 def test_black_pixels_divide_nothing_by_zero(metric):
     assert np.isfinite(metric(np.array([0.1, 1.0]), np.array([0.0, 1.0])))
 
@@ -320,6 +332,12 @@ def test_white_noise_has_no_structure_and_tiles_that_begin_elsewhere_are_missed(
     tiled = e + noise(4000, 5, seed=2).repeat(16, axis=1)
     assert tile_contrast(tiled) == pytest.approx(0.5, abs=0.02)
     assert abs(tile_contrast(tiled[:, 8:])) < 0.05
+
+
+def test_the_covariance_of_stacked_scenes_is_relative_to_the_mean_of_each():
+    scenes, R = noise(2, 64, 20), np.stack([np.full(20, 2.0), np.full(20, 0.5)])
+    apart = [box_covariance(images, reference) for images, reference in zip(scenes, R, strict=True)]
+    assert box_covariance(scenes, R) == pytest.approx(np.array(apart), rel=1e-12)
 
 
 @pytest.mark.parametrize("reach", [0, 80])

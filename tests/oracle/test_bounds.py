@@ -86,6 +86,20 @@ def test_a_W_Y_without_MIS_weights_violates_theorem_1_whose_V_is_that_of_the_rig
     assert (wrong > bounds_of(scene, V)[-1]).all()
 
 
+def test_where_a_target_misses_light_the_limit_variance_is_infinite_as_C_f_is() -> None:
+    v = np.array([0.5, 0.5])
+    f = np.array([[1.0, 3.0], [1.0, 0.0], [1.0, 3.0]])
+    p_hat = np.array([[2.0, 0.0], [2.0, 0.0], [0.0, 0.0]])
+    assert bounds.limit_variance(f, p_hat, v).tolist() == [np.inf, 0.0, np.inf]
+    assert np.isinf(bounds.reasonable(f, p_hat)).tolist() == [True, False, True]
+
+
+def test_the_formula_alone_would_call_it_negative() -> None:
+    """||p_hat|| int f^2 / p_hat over supp p_hat - (int f)^2 of the first case."""
+    assert 1 * 0.25 - (0.5 + 1.5) ** 2 < 0
+    assert bounds.limit_variance(np.array([1.0, 3.0]), np.array([2.0, 1e-3]), np.array([0.5, 0.5])) > 1000
+
+
 # ---------------------------------------------------------------- variance, two other ways
 
 

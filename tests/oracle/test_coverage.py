@@ -1,5 +1,6 @@
 """Who covers what: supports, canonical inputs, visibility, and contribution weights over realisable inputs only."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from restir_ref.mis import ALL_CANONICAL, ANY, WEIGHTS, Confidences, Density, We
 from restir_ref.oracle.bounds import largest
 from restir_ref.oracle.cells import Cells, Frame, cells
 from restir_ref.oracle.laws import bias_of
-from restir_ref.oracle.moments import Source, drawn, operator
+from restir_ref.oracle.moments import drawn
 from restir_ref.oracle.scenes import Loop, Scene, normalised, offset, paired, spatial_loop, three_pixel_scene
 from restir_ref.oracle.selected import selected
 from restir_ref.resampling import Input, contribution_weight, gris, weigh
@@ -27,7 +28,7 @@ from toy1d import Line, overlapping_supports, quotient
 PROMISING = {name: mis for name, mis in WEIGHTS.items() if mis.unbiased_for != ALL_CANONICAL}
 NEEDING_NOBODY = {name: mis for name, mis in WEIGHTS.items() if mis.unbiased_for == ANY}
 TALBOT, CONSTANT = WEIGHTS["talbot"], WEIGHTS["constant"]
-CENTRE = 3
+CENTRE, OTHERS = 3, (0, 1, 2, 4, 5, 6)
 
 every_promising_weight = pytest.mark.parametrize("mis", PROMISING.values(), ids=PROMISING)
 
@@ -107,11 +108,14 @@ def test_a_gap_that_no_shift_reaches_is_missing_from_the_integral() -> None:
     assert Y.P[0, 2] == 0
 
 
-def expected_at_centre(frame: Frame, c: float) -> Array:
-    """E[f(Y) W_Y 1{Y=y}] of the centre pixel, (K,), whose own sample has confidence c; the neighbours' have 1."""
-    K = frame.cells.v.shape[-1]
-    sources = [Source(CENTRE * K, frame, CENTRE, c), *(Source(i * K, frame, i, 1) for i in range(7) if i != CENTRE)]
-    return frame.cells.f[CENTRE] * (operator(sources, 7 * K, TALBOT).L @ drawn(frame).mean)
+def expected_at_centre(frame: Frame, pixels: Iterable[int]) -> Array:
+    """E[f(Y) W_Y 1{Y=y}] of the centre pixel, (K,), from one sample of each of the pixels."""
+    W, x = drawn(frame).mean.reshape(7, -1), np.arange(frame.cells.v.shape[-1])
+    at, E = [Pixels(frame, np.full(len(x), i)) for i in range(7)], np.zeros(len(x))
+    inputs = [Input(Reservoirs(x, W[i], np.ones(len(x))), at[i]) for i in pixels]
+    for y in weigh(inputs, at[CENTRE], TALBOT):
+        np.add.at(E, y.x, y.mW)
+    return frame.cells.f[CENTRE] * E
 
 
 @pytest.mark.claims("GRIS-A19")
@@ -120,8 +124,8 @@ def test_without_its_own_sample_the_centre_of_seven_pixels_loses_exactly_its_exc
     f, v = frame.cells.f, frame.cells.v
     alone = (f[CENTRE] > 0) & ((f > 0).sum(axis=0) == 1)
     truth = f[CENTRE] * v[CENTRE]
-    assert expected_at_centre(frame, 1.0) == pytest.approx(truth, rel=1e-12)
-    assert expected_at_centre(frame, 0.0) == pytest.approx(np.where(alone, 0, truth), rel=1e-12)
+    assert expected_at_centre(frame, range(7)) == pytest.approx(truth, rel=1e-12)
+    assert expected_at_centre(frame, OTHERS) == pytest.approx(np.where(alone, 0, truth), rel=1e-12)
     assert truth[alone].sum() > 0.01 * truth.sum()
 
 
@@ -130,6 +134,38 @@ def test_without_its_own_sample_the_centre_of_seven_pixels_loses_exactly_its_exc
 def test_weights_that_need_a_canonical_input_say_so(name) -> None:
     with pytest.raises(ValueError, match="canonical"):
         selected(from_others(three_pixel_scene().now, WEIGHTS[name]), np.ones((1, 3)))
+
+
+def mostly_own() -> Frame:
+    """Pixel 0 has light in four cells of volume 1, pixel 1 in three of them."""
+    f, pdf = np.array([[1.0] * 4, [1.0] * 3 + [0.0]]), np.array([[[1 / 4] * 4, [1 / 3] * 3 + [0.0]]])
+    return Frame(cells(np.ones((2, 4)), f, pdf, paired(2, 4, {(0, 1): (0, 1, 2, -1)})), 2)
+
+
+def with_own_confidence(c: float, mis: Weights) -> float:
+    """E[f(Y) W_Y] of pixel 0 from its own sample, of confidence c, and pixel 1's, of confidence 1; the truth is 4."""
+    frame = mostly_own()
+
+    def loop(index: Array, chance: Chance) -> Reservoirs:
+        at = [Pixels(frame, np.full(len(index), i)) for i in (0, 1)]
+        own, other = (initial(each, chance) for each in at)
+        return gris([Input(replace(own, c=c * own.c), at[0]), Input(other, at[1])], at[0], mis, chance)
+
+    return float(selected(loop, frame.cells.v[:1]).W.sum())
+
+
+@pytest.mark.claims("GRIS-A19")
+@pytest.mark.parametrize("mis", NEEDING_NOBODY.values(), ids=NEEDING_NOBODY)
+def test_where_only_a_sample_of_confidence_zero_can_come_from_is_not_lost_without_a_word(mis) -> None:
+    assert with_own_confidence(1e-6, mis) == pytest.approx(4, rel=1e-9)
+    with pytest.raises(ValueError, match=r"^input 0 has confidence 0 in column \d+, .* a positive confidence"):
+        with_own_confidence(0, mis)
+
+
+@pytest.mark.claims("GRIS-A19")
+@pytest.mark.parametrize("mis", NEEDING_NOBODY.values(), ids=NEEDING_NOBODY)
+def test_weights_that_promise_less_lose_it(mis) -> None:
+    assert with_own_confidence(0, replace(mis, unbiased_for=ALL_CANONICAL)) == pytest.approx(3)
 
 
 # ---------------------------------------------------------------- visibility
@@ -171,7 +207,8 @@ def blind_to_ends() -> Frame:
 
 @pytest.mark.claims("GRIS-A15")
 def test_neighbours_whose_targets_ignore_the_ends_of_their_domains_make_the_centre_of_seven_pixels_dark() -> None:
-    right, wrong = (expected_at_centre(frame, 1.0) for frame in (quotient(overlapping_supports(), 42), blind_to_ends()))
+    frames = (quotient(overlapping_supports(), 42), blind_to_ends())
+    right, wrong = (expected_at_centre(frame, range(7)) for frame in frames)
     cells = quotient(overlapping_supports(), 42).cells
     truth = (cells.f * cells.v)[CENTRE]
     assert right == pytest.approx(truth, rel=1e-12)

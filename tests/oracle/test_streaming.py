@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from restir_ref.batch import where
+from restir_ref.batch import pick, ratio, where
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.mis import WEIGHTS
 from restir_ref.oracle.enumeration import outcomes
 from restir_ref.oracle.laws import bias_of
-from restir_ref.oracle.scenes import offset
+from restir_ref.oracle.scenes import offset, three_pixel_scene
 from restir_ref.resampling import Candidate, Input, contribution_weight, select, select_any, weigh
 from restir_ref.restir import around, initial
 from restir_ref.streaming import Stream, select_streaming
@@ -101,3 +101,51 @@ def test_known_densities_may_replace_targets_in_the_weights_of_raw_candidates(mi
         return select(ys, chance, X.c)
 
     assert abs(bias_of(loop, scene.v, scene.support)).max() < 1e-13
+
+
+# ---------------------------------------------------------------- candidates with and without c/m
+
+SELECTORS = {"select": select, "select_streaming": select_streaming}
+
+
+def mixture(scene, selector, order):
+    """Both pixels' samples twice: a third by Talbot weights, which are their own c_i, and two thirds by 1/Z."""
+
+    def loop(index, chance):
+        here = Pixels(scene.now, index)
+        X = initial(here, chance)
+        inputs = [Input(X, here), *around(X, [offset(scene.now, index, 1)])]
+        third, rest = (
+            [replace(y, mW=y.mW * share) for y in weigh(inputs, here, WEIGHTS[name])]
+            for name, share in (("talbot", 1 / 3), ("1/Z", 2 / 3))
+        )
+        return selector([[*third, *rest][k] for k in order], chance, X.c)
+
+    return loop
+
+
+@pytest.mark.parametrize("selector", SELECTORS.values(), ids=SELECTORS)
+@given(scene=scenes(n=2), order=st.permutations(range(4)))
+def test_candidates_with_corrections_of_their_own_beside_others_are_unbiased(selector, order, scene) -> None:
+    assert abs(bias_of(mixture(scene, selector, order), scene.v, scene.support)).max() < 1e-13
+
+
+def corrected_by_place(candidates, chance, c) -> Reservoirs:
+    """A mistake: the c/m of those that have one, numbered anew."""
+    offered = list(candidates)
+    w = np.stack([each.p_hat * each.mW for each in offered])
+    s = chance.choose(w)
+    W = ratio(w.sum(axis=0), pick([each.p_hat for each in offered], s))
+    listed = [each.c_over_m for each in offered if each.c_over_m is not None]
+    return Reservoirs(pick([each.x for each in offered], s), W * pick(listed, s), c)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (0, 2, 1, 3)])
+def test_corrections_of_the_wrong_candidate_are_biased(order) -> None:
+    scene = three_pixel_scene()
+    bias, right = (
+        abs(bias_of(mixture(scene, selector, order), scene.v, scene.support)).max()
+        for selector in (corrected_by_place, select)
+    )
+    assert bias > 0.05
+    assert right < 1e-13
