@@ -125,7 +125,8 @@ def _computed(p: Pass, compute: Compute) -> tuple[Terms, Array, Array]:
     unclear = ~free.clear if p.u else np.ones(len(chosen), dtype=bool)
     possible = np.take_along_axis(free.w, p.s[None], axis=0)[0] > 0
     allowed = (free.w_sum == 0) | (possible & ((p.s == chosen) | unclear))
-    return compute(replace(p, s=np.where(allowed, p.s, chosen))), chosen, allowed
+    s = np.where(allowed, p.s, chosen)
+    return free if np.array_equal(s, free.s) else compute(replace(p, s=s)), chosen, allowed
 
 
 def columns(dump: Dump, index: Array) -> Dump:

@@ -32,7 +32,8 @@ def read(path: Path | str) -> dict[str, Any]:
     except BadDump:
         raise
     except Exception as error:  # hazard: for damaged bytes zipfile, its decoders and NumPy raise a dozen types
-        raise BadDump(f"{path.name} is {remedy.format(str(error) or type(error).__name__)}") from error
+        said = str(error) or type(error).__name__
+        raise BadDump(f"{path.name} is {remedy.format(said[:200])}") from error
 
 
 def _arrays(path: Path) -> dict[str, Any]:

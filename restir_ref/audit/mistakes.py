@@ -329,7 +329,7 @@ def suspects(dump: Dump) -> Iterator[Mistake]:
     yield from MISTAKES
     p, W_Y = dump.recorded, dump.found.get("W_Y", np.zeros(1))
     limit = W_Y.max()
-    if limit > 0 and np.count_nonzero(W_Y == limit) > 1:
+    if limit > 0 and np.count_nonzero(limit == W_Y) > 1:
         yield Mistake(f"W_Y clamped at {limit:.7g}", "W clamped", clamped(limit))
     for name, mis in KNOWN.items():
         if name != p.mis:
