@@ -1,10 +1,17 @@
 """The README's examples run, are short, and print what it promises."""
 
 import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
 
 from tests.checkout import ROOT
+from tests.figures.project import figures, project
 
-EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+LINES = [line.partition("  #")[0].strip() for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
+         for line in block.splitlines()]  # fmt: skip
 
 
 def test_the_readme_examples_run_and_find_the_planted_bug(capsys) -> None:
@@ -32,3 +39,59 @@ def test_the_readme_example_in_flatland_shows_what_reuse_is_for(capsys) -> None:
 def test_each_readme_example_runs_by_itself() -> None:
     for block in EXAMPLES:
         exec(compile(block, "README.md", "exec"), {})
+
+
+# ---------------------------------------------------------------- the printed shell lines, one after the other
+
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+GIVEN = {"$(PY)": "python", "$(JOBS)": "2", "$(OUT)": "out", "$(ARGS)": ""}
+
+
+def recipe(target: str) -> list[str]:
+    """The commands of a target of the Makefile, with the variables it sets."""
+    (found,) = re.findall(rf"^{target}:.*\n((?:\t.*\n)+)", MAKEFILE, re.MULTILINE)
+    lines = found.replace("\\\n", "").splitlines()
+    for variable, value in GIVEN.items():
+        lines = [line.replace(variable, value) for line in lines]
+    return [line.strip() for line in lines]
+
+
+def commands(lines: list[str]) -> Iterator[list[str]]:
+    """What runs, in order, of `python -m figures`: a figure that takes no time for the real ones, in one process."""
+    for line in lines:
+        for command in recipe(line.removeprefix("make ")) if line.startswith("make ") else [line]:
+            if command.startswith("python -m figures "):
+                words = shlex.split(re.sub(r"--(dask|jobs) \S+", "", command))[3:]
+                yield ["DEMO-F01" if re.fullmatch(r"[A-Z]+-\w+", word) else word for word in words]
+
+
+def failures(lines: list[str], folder: Path) -> list[str]:
+    """Commands that end with an error, run in order in a folder."""
+    here = project(folder, "sound")
+    return [" ".join(words) for words in commands(lines) if figures(here, *words, *progress(words)) != 0]
+
+
+def progress(words: list[str]) -> list[str]:
+    return ["--progress", "log"] if words[0] == "run" else []
+
+
+def test_the_printed_shell_lines_work_in_the_order_printed(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert LINES[0] == "make figures"
+    assert [words[0] for words in commands(LINES)] == ["run", "report", "list", "run", "run", "ledger", "audit"]
+    assert failures(LINES, tmp_path) == []
+
+
+def test_a_paper_run_into_the_folder_of_quick_results_is_noticed(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert failures([line.replace("out-paper", "out") for line in LINES], tmp_path) == [
+        "run DEMO-F01 --preset paper --out out"
+    ]
+
+
+def test_every_other_printed_line_names_something_that_exists() -> None:
+    others = [line for line in LINES if not line.startswith("python -m figures ")]
+    targets = [line.removeprefix("make ") for line in others if line.startswith("make ")]
+    assert [line for line in others if not line.startswith("make ")] == [". .venv/bin/activate"]
+    assert all(re.search(rf"^{target}:", MAKEFILE, re.MULTILINE) for target in targets)
+    assert targets == ["figures", "test", "bench"]

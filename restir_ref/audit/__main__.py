@@ -1,6 +1,7 @@
 """`python -m restir_ref.audit DUMP`: audit a dumped pass.  Exit status 0: right, 1: wrong, 2: cannot be read."""
 
 import argparse
+import math
 import sys
 from collections.abc import Sequence
 
@@ -18,12 +19,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("dump", metavar="DUMP", help="a .npz archive or a .json file")
     parser.add_argument("--rtol", type=float, default=RTOL, help="relative tolerance (default: %(default)s)")
     options = parser.parse_args(arguments)
-    if not options.rtol > 0:
-        parser.error(f"--rtol must be positive, but is {options.rtol}")
+    if not 0 < options.rtol < math.inf:
+        parser.error(f"--rtol must be positive and finite, but is {options.rtol}")
     try:
         report = audit_dump(options.dump, rtol=options.rtol)
-    except BadDump as error:
-        print(f"cannot read the dump: {error}", file=sys.stderr)
+    except (BadDump, MemoryError) as error:
+        print(
+            f"cannot read the dump: {str(error) or 'it does not fit into memory; dump fewer columns.'}", file=sys.stderr
+        )
         return 2
     print(report)
     return 0 if report.right else 1

@@ -52,9 +52,14 @@ class Check:
     tolerance: Array
 
     @property
+    def right(self) -> Array:
+        """Where found was compared with what is expected, and is it."""
+        return np.asarray(self.compared & ~self.wrong)
+
+    @property
     def wrong(self) -> Array:
         """Where found is not expected."""
-        off = ~(abs(self.found - self.expected) <= self.tolerance)
+        off = ~(abs(self.found - self.expected) <= self.tolerance) | np.isinf(self.expected)
         flushed = (self.found == 0) & (abs(self.expected) < UNDERFLOW)
         return np.asarray(off & ~flushed & self.compared)
 
@@ -79,7 +84,7 @@ def checks(dump: Dump, compute: Compute, rtol: float, skipped: Sequence[str] = (
         if term in found:
             yield Check(term, expected, found[term], compared, rtol * (expected + slack))
     if p.s is not None:
-        yield Check("s", np.where(settled, p.s, chosen), p.s, ~settled, np.zeros(p.s.shape))
+        yield Check("s", np.where(settled, p.s, chosen), p.s, ALL, np.zeros(p.s.shape))
     for term, expected, compared in (("W_Y", terms.W_Y, settled), ("c_Y", terms.c_Y, ALL)):
         if term in found:
             yield Check(term, expected, found[term], compared, rtol * expected)
@@ -120,7 +125,8 @@ def _computed(p: Pass, compute: Compute) -> tuple[Terms, Array, Array]:
     unclear = ~free.clear if p.u else np.ones(len(chosen), dtype=bool)
     possible = np.take_along_axis(free.w, p.s[None], axis=0)[0] > 0
     allowed = (free.w_sum == 0) | (possible & ((p.s == chosen) | unclear))
-    return compute(replace(p, s=np.where(allowed, p.s, chosen))), chosen, allowed
+    s = np.where(allowed, p.s, chosen)
+    return free if np.array_equal(s, free.s) else compute(replace(p, s=s)), chosen, allowed
 
 
 def columns(dump: Dump, index: Array) -> Dump:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from restir_ref.audit.compare import Check, Wrong, checks, columns
-from restir_ref.audit.fields import RESULTS
+from restir_ref.audit.fields import LARGEST, RESULTS, BadDump
 from restir_ref.audit.load import Dump, load
 from restir_ref.audit.mistakes import Mistake, right, suspects
 from restir_ref.batch import Array
@@ -62,6 +62,7 @@ class DumpReport:
         return "\n".join(_lines(self))
 
 
+@np.errstate(all="ignore")  # dumps hold any numbers: overflow is a wrong term, or refused
 def audit_dump(source: Path | str | Mapping[str, Any], *, rtol: float = RTOL) -> DumpReport:
     """Recompute a dumped pass (.npz, .json, or a mapping of names to arrays) and name the first wrong term.
 
@@ -69,7 +70,7 @@ def audit_dump(source: Path | str | Mapping[str, Any], *, rtol: float = RTOL) ->
     Raises BadDump, a ValueError, for what cannot be read; `docs/audit.md` has the format.
     """
     dump = load(source)
-    compared = list(checks(dump, right, rtol))
+    compared = _compared(dump, rtol)
     wrong = [check for check in compared if check.wrong.any()]
     M, N = dump.recorded.p_hat.shape
     return DumpReport(
@@ -83,26 +84,40 @@ def audit_dump(source: Path | str | Mapping[str, Any], *, rtol: float = RTOL) ->
     )
 
 
+def _compared(dump: Dump, rtol: float) -> list[Check]:
+    """Every dumped term beside the right one, as far as float64 can tell what is right."""
+    try:
+        return list(checks(dump, right, rtol))
+    except ValueError as error:
+        raise BadDump(
+            f"the numbers of the dump overflow where they meet ({error}) Leave these columns out, or write 0 for what "
+            f"is below {1 / LARGEST:.0e}."
+        ) from error
+
+
 def _explanations(dump: Dump, first: Check, rtol: float) -> tuple[Explanation, ...]:
     """Complete ones, or else those that explain most of the first wrong term."""
     marked = in_column(first.wrong)
     some = np.concatenate([np.flatnonzero(mask)[:SOME] for mask in (marked, ~marked)])
     part, was = columns(dump, some), first.wrong[..., some]
-    found = [each for mistake in suspects(part.recorded) for each in _explained(part, mistake, first.term, was, rtol)]
+    found = [each for mistake in suspects(part) for each in _explained(part, mistake, first.term, was, rtol)]
     complete = tuple(each for each in found if each.complete)
     return complete or tuple(sorted(found, key=lambda each: -each.share)[:3])
 
 
 def _explained(dump: Dump, mistake: Mistake, term: str, was: Array, rtol: float) -> Iterator[Explanation]:
-    """How far a mistake explains a term that was wrong, if it does in at least half of the columns and no others."""
+    """How far a mistake explains a term that was wrong, if it does in at least half of the columns and no others.
+
+    A column explains nothing where the mistake leaves open what to expect.
+    """
     skipped = () if term == "p_hat_from" else ("p_hat_from",)  # then it was right, whatever the mistake makes of it
     try:
-        left = {check.term: check.wrong for check in checks(dump, mistake.compute, rtol, skipped)}
+        left = {check.term: check for check in checks(dump, mistake.compute, rtol, skipped)}
     except ValueError:  # the mistake needs what this pass does not have: densities, a canonical input
         return
-    share = 1 - in_column(left[term] & was).sum() / in_column(was).sum()
-    complete = not any(wrong.any() for wrong in left.values())
-    if complete or (share >= 0.5 and not (left[term] & ~was).any()):
+    share = 1 - in_column(was & ~left[term].right).sum() / in_column(was).sum()
+    complete = not any(check.wrong.any() for check in left.values())
+    if share >= 0.5 and not (left[term].wrong & ~was).any():
         yield Explanation(mistake.name, mistake.bug, float(share), complete)
 
 

@@ -5,11 +5,9 @@ JSON object with lists of numbers, or any mapping of names to arrays.  M inputs,
 """
 
 import difflib
-import json
-import zipfile
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -24,8 +22,15 @@ LARGEST = 1e75
 """Products of four numbers that are not larger are still finite."""
 
 
+MOST_NUMBERS = 2**27
+"""M M N of the largest pass: its audit takes ten arrays of that size, or some 10 GB."""
+
+
 class BadDump(ValueError):
-    """A dump that cannot be read; the message names the field, its value and the remedy."""
+    """A dump that cannot be read; the message, on one line, names the field, its value and the remedy."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.split()))
 
 
 @dataclass(frozen=True)
@@ -72,46 +77,11 @@ RESULTS: Mapping[str, Field] = MappingProxyType(
 )
 ARRAYS: Mapping[str, Field] = MappingProxyType({**INPUTS, **DENSITIES, **OPTIONS, **RESULTS})
 WORDS = ("format", "version", "mis")
+LONGEST_WORD = 40
+"""Words are read, and quoted, up to here."""
+
 IGNORED = "note"
 """Fields whose name begins like this are for people."""
-
-
-def read(path: Path | str) -> dict[str, Any]:
-    """The fields of a .npz or .json file; raises BadDump for files that are neither, corrupt, or pickled."""
-    path = Path(path)
-    if not path.is_file():
-        raise BadDump(f"there is no file {path}: pass a dump, a .npz archive or a .json file.")
-    reader = {".npz": _read_npz, ".json": _read_json}.get(path.suffix.lower())
-    if reader is None:
-        raise BadDump(f"{path.name} is neither .npz nor .json: write it by numpy.savez(path, **fields) or as JSON.")
-    return reader(path)
-
-
-def _read_npz(path: Path) -> dict[str, Any]:
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (OSError, EOFError, KeyError, zipfile.BadZipFile, AttributeError, TypeError) as error:
-        raise BadDump(
-            f"{path.name} is no readable .npz archive ({error}): write it by numpy.savez(path, **fields)."
-        ) from error
-    except ValueError as error:
-        raise BadDump(
-            f"{path.name} is damaged or holds pickled objects, which are not read ({error}): "
-            "write plain arrays of numbers, and the words as strings, by numpy.savez(path, **fields)."
-        ) from error
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        fields = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise BadDump(
-            f"{path.name} is no JSON ({error}): write one object with a list of numbers per field."
-        ) from error
-    if not isinstance(fields, dict):
-        raise BadDump(f"{path.name} holds a JSON {type(fields).__name__}, not an object: name the fields.")
-    return fields
 
 
 def check_names(fields: Mapping[str, Any], required: Mapping[str, Field]) -> None:
@@ -119,21 +89,29 @@ def check_names(fields: Mapping[str, Any], required: Mapping[str, Field]) -> Non
     _check_header(fields)
     known = (*WORDS, *ARRAYS)
     for name in fields:
-        if name not in known and not name.startswith(IGNORED):
-            raise BadDump(f"unknown field {name!r}: {_suggestion(name)}; fields named {IGNORED}... are ignored.")
+        if name not in known and not str(name).startswith(IGNORED):
+            raise BadDump(
+                f"unknown field {reprlib.repr(name)}: {_suggestion(str(name)[:LONGEST_WORD])}; "
+                f"fields named {IGNORED}... are ignored."
+            )
     missing = [f"{name!r} ({field.meaning})" for name, field in required.items() if name not in fields]
     if missing:
         raise BadDump(f"the dump has no {', no '.join(missing)}: write what the pass used.")
 
 
 def _check_header(fields: Mapping[str, Any]) -> None:
-    found = {name: fields.get(name) for name in ("format", "version")}
-    if str(found["format"]) != FORMAT:
-        raise BadDump(
-            f"'format' is {found['format']!r}, not {FORMAT!r}: this is no dump of a pass, or it lacks its name."
-        )
-    if str(found["version"]) != str(VERSION):
-        raise BadDump(f"'version' is {found['version']!s}, but this audit reads version {VERSION}: see docs/audit.md.")
+    if (name := word(fields, "format")) != FORMAT:
+        raise BadDump(f"'format' is {name!r}, not {FORMAT!r}: this is no dump of a pass, or it lacks its name.")
+    if (version := word(fields, "version")) != str(VERSION):
+        raise BadDump(f"'version' is {version}, but this audit reads version {VERSION}: see docs/audit.md.")
+
+
+def word(fields: Mapping[str, Any], name: str) -> str:
+    """A word as text, also where it is a number, missing, or in an array () as in archives; shortened."""
+    value = fields.get(name)
+    if getattr(value, "shape", None) == ():
+        value = value.item()  # type: ignore[union-attr]
+    return value[:LONGEST_WORD] if isinstance(value, str) else reprlib.repr(value)
 
 
 def _suggestion(name: str) -> str:
@@ -146,13 +124,14 @@ def _suggestion(name: str) -> str:
 
 def numbers(fields: Mapping[str, Any], name: str, sizes: Mapping[str, int]) -> Array:
     """A field as float64 array, if its axes have these sizes and its numbers are finite and not negative."""
-    values = array(name, fields[name])
+    given = array(name, fields[name])
     wanted = tuple(sizes[axis] for axis in ARRAYS[name].axes)
-    if values.shape != wanted:
+    if given.shape != wanted:
         raise BadDump(
-            f"{name!r} has shape {values.shape}, but its axes ({', '.join(ARRAYS[name].axes)}) are {wanted}: "
+            f"{name!r} has shape {given.shape}, but its axes ({', '.join(ARRAYS[name].axes)}) are {wanted}: "
             f"{ARRAYS[name].meaning}; M inputs, N columns, columns last."
         )
+    values = given.astype(float)
     bad = ~((values >= 0) & (values <= LARGEST))
     if bad.any():
         where = tuple(int(k) for k in np.argwhere(bad)[0])
@@ -164,14 +143,14 @@ def numbers(fields: Mapping[str, Any], name: str, sizes: Mapping[str, int]) -> A
 
 
 def array(name: str, values: Any) -> Array:
-    """Numbers as float64; raises BadDump for words, ragged lists, complex numbers and objects."""
+    """Real numbers of any type; raises BadDump for words, ragged lists, complex numbers and objects."""
     try:
         found = np.asarray(values)
     except ValueError as error:
         raise BadDump(f"{name!r} is no rectangular array ({error}): give all rows the same length.") from error
     if found.dtype.kind not in "biuf":
         raise BadDump(f"{name!r} holds {found.dtype} instead of real numbers: {ARRAYS[name].meaning}.")
-    return found.astype(float)
+    return found
 
 
 def integers(name: str, values: Array, limit: int) -> Array:

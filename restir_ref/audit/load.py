@@ -11,14 +11,16 @@ from restir_ref.audit.engines import KNOWN
 from restir_ref.audit.fields import (
     ARRAYS,
     INPUTS,
+    MOST_NUMBERS,
     BadDump,
     Field,
     array,
     check_names,
     integers,
     numbers,
-    read,
+    word,
 )
+from restir_ref.audit.files import read
 from restir_ref.audit.recorded import GIVEN, Pass
 from restir_ref.batch import Array
 from restir_ref.mis import CANONICAL_COVERS
@@ -38,7 +40,7 @@ class Dump:
 def load(source: Path | str | Mapping[str, Any]) -> Dump:
     """A dump from a file or from a mapping of names to arrays; raises BadDump."""
     fields = source if isinstance(source, Mapping) else read(source)
-    mis = str(fields.get("mis"))
+    mis = word(fields, "mis")
     check_names(fields, _required(mis, fields))
     if mis not in (*KNOWN, GIVEN):
         raise BadDump(
@@ -69,7 +71,13 @@ def _sizes(fields: Mapping[str, Any]) -> dict[str, int]:
             f"'p_hat' has shape {shape}, but must have two axes (M, N), M inputs and N columns, at least one of each: "
             "a single pass is N = 1, [[...], [...]]."
         )
-    return {"M": shape[0], "N": shape[1]}
+    M, N = shape
+    if M * M * N > MOST_NUMBERS:
+        raise BadDump(
+            f"'p_hat' has shape {shape}, which makes M M N = {M * M * N} densities, more than the limit of "
+            f"{MOST_NUMBERS}: dump fewer columns; each is audited by itself."
+        )
+    return {"M": M, "N": N}
 
 
 def _check_values(found: Mapping[str, Array], mis: str, M: int) -> None:
@@ -105,7 +113,7 @@ def _check_selection(found: Mapping[str, Array]) -> None:
 def recorded(found: Mapping[str, Array], mis: str) -> Pass:
     """The pass of checked fields."""
     M, N = found["p_hat"].shape
-    nothing = np.full((M, M, N), np.nan)
+    nothing = np.broadcast_to(np.nan, (M, M, N))
     whole = found.get("p_hat_from", nothing)
     return Pass(
         mis=mis,
@@ -116,7 +124,7 @@ def recorded(found: Mapping[str, Array], mis: str) -> Pass:
         c=found["c"],
         p_hat_own=found.get("p_hat_own", nothing[0]),
         p_hat_back=found.get("p_hat_back", whole),
-        J_back=found.get("J_back", np.ones((M, M, N))),
+        J_back=found.get("J_back", np.broadcast_to(1.0, (M, M, N))),
         cap=float(found.get("cap", np.inf)),
         u=_draws(found),
         s=found["s"].astype(int) if "s" in found else None,

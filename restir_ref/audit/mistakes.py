@@ -11,6 +11,7 @@ import numpy as np
 
 from restir_ref.audit.compare import Compute
 from restir_ref.audit.engines import KNOWN
+from restir_ref.audit.load import Dump
 from restir_ref.audit.recorded import Pass, Terms, recompute, weights_of
 from restir_ref.batch import Array, ratio, total
 from restir_ref.mis import Confidences, Density, Mis, Weights, constant, talbot
@@ -122,6 +123,17 @@ def capped_below(p: Pass) -> Weights:
     return Weights(m)
 
 
+def grown_from_zero(p: Pass) -> Weights:
+    """Canonical weights that start at 0 and grow with every neighbour: 0 where none has any confidence."""
+    mis = weights_of(p)
+
+    def m(i: int, q: Density, c: Confidences) -> Array:
+        alone = c.C == c.C_R if i in c.canonical else np.array(False)
+        return np.where(alone, 0, mis.m(i, q, c))
+
+    return replace(mis, m=m)
+
+
 def nothing(i: int, q: Density, c: Confidences) -> Array:
     """m = 1."""
     return np.ones(c[i].shape)
@@ -138,6 +150,11 @@ def at_s(values: Array, s: Array) -> Array:
 def count(p: Pass) -> Array:
     """C = sum_j c_j with capped confidences."""
     return np.asarray(np.where(p.canonical[:, None], p.c, np.minimum(p.c, p.cap)).sum(axis=0))
+
+
+def neighbours(p: Pass) -> Array:
+    """C_N, the same without the pixel's own samples."""
+    return np.asarray(np.where(p.canonical[:, None], 0, np.minimum(p.c, p.cap)).sum(axis=0))
 
 
 def divided_by_M(p: Pass, terms: Terms) -> Terms:
@@ -202,6 +219,23 @@ def unnormalised(p: Pass, terms: Terms) -> Terms:
     return replace(terms, m=terms.m * count(p), w=terms.w * count(p), w_sum=terms.w_sum * count(p))
 
 
+def own_not_counted(p: Pass, terms: Terms) -> Terms:
+    """m_i = c_i / C_N and the like: C without the pixel's own samples, which are merged all the same."""
+    C_N = neighbours(p)
+    grown = np.where(C_N > 0, ratio(count(p), C_N), 1)
+    return replace(terms, m=terms.m * grown, w=terms.w * grown, w_sum=terms.w_sum * grown, W_Y=terms.W_Y * grown)
+
+
+def own_not_counted_at_the_end(p: Pass, terms: Terms) -> Terms:
+    """w_i = c_i p_hat W J, divided by C_N at the end."""
+    return replace(unnormalised(p, terms), W_Y=own_not_counted(p, terms).W_Y)
+
+
+def clamped(limit: float) -> Compute:
+    """W_Y <- min(W_Y, limit)."""
+    return ended(lambda p, terms: replace(terms, W_Y=np.minimum(terms.W_Y, limit)))
+
+
 def against_old_sum(p: Pass) -> Terms:
     """Streaming that compares u times the sum *before* the new weight with the new weight."""
     terms = right(replace(p, s=None))
@@ -262,6 +296,9 @@ MISTAKES = (
         weighted(other(talbot, constant)),
     ),
     Mistake("no m in w", "", weighted(other(nothing))),
+    Mistake("canonical weight 0 without neighbours", "", weighted(grown_from_zero)),
+    Mistake("own samples not counted in C", "", ended(own_not_counted)),
+    Mistake("own samples not counted in C, the sum divided at the end only", "", ended(own_not_counted_at_the_end)),
     Mistake("W_Y divided by M once more", "divided by M twice", ended(divided_by_M)),
     Mistake("W_Y divided by the sum of confidences once more", "divided by M twice", ended(divided_by_C)),
     Mistake("W_Y = 1 / p_hat(y)", "", ended(one_over_target)),
@@ -287,9 +324,13 @@ MISTAKES = (
 )
 
 
-def suspects(p: Pass) -> Iterator[Mistake]:
-    """All mistakes, and other weights than the dump says."""
+def suspects(dump: Dump) -> Iterator[Mistake]:
+    """All mistakes, other weights than the dump says, and a limit on W_Y where it shows: twice, as the largest."""
     yield from MISTAKES
+    p, W_Y = dump.recorded, dump.found.get("W_Y", np.zeros(1))
+    limit = W_Y.max()
+    if limit > 0 and np.count_nonzero(limit == W_Y) > 1:
+        yield Mistake(f"W_Y clamped at {limit:.7g}", "W clamped", clamped(limit))
     for name, mis in KNOWN.items():
         if name != p.mis:
             yield Mistake(f"the weights are {name!r}, not {p.mis!r}", "", weighted(lambda p, mis=mis: mis))  # type: ignore[misc]

@@ -22,6 +22,13 @@ def streamed(**more: Any) -> dict[str, Any]:
     return {**given, "u_stream": np.random.default_rng(6).random((M, N))}
 
 
+def lonely(**more: Any) -> dict[str, Any]:
+    """Neighbours of confidence 0 in every other column."""
+    given = fields(**more)
+    given["c"][1:, ::2] = 0
+    return given
+
+
 class OwnWithoutJ(Shader):
     def density(self, i, j):
         return self.a.own[i] if i == j else super().density(i, j)
@@ -95,6 +102,27 @@ class AllInputs(Shader):
 class NoM(Shader):
     def m(self, i):
         return 1
+
+
+class GrownFromZero(Shader):
+    def m(self, i):
+        return super().m(i) if i in self.others or any(self.confidence(j) for j in self.others) else 0
+
+
+class OwnNotCounted(Shader):
+    def divisor(self):
+        return sum(self.confidence(j) for j in self.others) or self.c_Y()
+
+    def m(self, i):
+        return divided(super().m(i) * self.c_Y(), self.divisor())
+
+
+class OwnNotCountedLate(OwnNotCounted):
+    def m(self, i):
+        return Shader.m(self, i) * self.c_Y()
+
+    def W_Y(self, s, w_sum):
+        return divided(super().W_Y(s, w_sum), self.divisor())
 
 
 class DividedByM(Shader):
@@ -207,6 +235,9 @@ PLANTED = {
     "1/M, contribution weight included": (OneOverM, "1/Z", fields, "W_Y"),
     "contribution weights over all inputs": (AllInputs, "talbot", fields, "W_Y"),
     "no m in w": (NoM, "talbot", fields, "m"),
+    "canonical weight 0 without neighbours": (GrownFromZero, "pairwise", lonely, "m"),
+    "own samples not counted in C": (OwnNotCounted, "constant", fields, "m"),
+    "own samples not counted in C, the sum divided at the end only": (OwnNotCountedLate, "constant", fields, "m"),
     "W_Y divided by M once more": (DividedByM, "pairwise", fields, "W_Y"),
     "W_Y divided by the sum of confidences once more": (DividedByC, "defensive", fields, "W_Y"),
     "W_Y = 1 / p_hat(y)": (OneOverTarget, "talbot", fields, "W_Y"),

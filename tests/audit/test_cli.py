@@ -19,7 +19,7 @@ WRONG = dumped(fields(n=8), "talbot", DividedByM)
     [
         (RIGHT, 0, "right: J, p_hat_own"),
         (WRONG, 1, "looks like: W_Y divided by M once more"),
-        ({"a": 1}, 2, "'format' is None"),
+        ({"a": 1}, 2, "'format' is 'None'"),
     ],
     ids=["right", "wrong", "unreadable"],
 )

@@ -13,7 +13,16 @@ from restir_ref.audit.estimator import TOLERANCE
 from restir_ref.audit.likeness import Signature, lookalikes, signatures
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.mis import ALL_CANONICAL, WEIGHTS
-from restir_ref.oracle.scenes import reference_scene, spatial_loop, three_pixel_scene, two_frame_loop
+from restir_ref.oracle.cells import Frame, cells
+from restir_ref.oracle.scenes import (
+    Scene,
+    normalised,
+    paired,
+    reference_scene,
+    spatial_loop,
+    three_pixel_scene,
+    two_frame_loop,
+)
 from restir_ref.oracle.zoo import BUGS, INEFFICIENT, exact_bias
 from restir_ref.restir import initial
 from tests.audit.strangers import SCENE, UNAUDITABLE, one_over_M, returning, right
@@ -123,6 +132,32 @@ def test_a_bias_that_the_mean_does_not_show_is_found() -> None:
     report = audit_estimator(swapped_light, SCENE)
     np.testing.assert_allclose(report.mean, 0, atol=1e-14)
     assert abs(report.worst[2]) > 0.01
+
+
+def dark_target() -> Scene:
+    """One pixel, three cells, and a target of 0 in the last one, where f is 4."""
+    v, f = np.ones((1, 3)), np.array([[1.0, 3.0, 4.0]])
+    known = cells(v, f, normalised(np.ones((1, 3)), v), paired(1, 3, {}), p_hat=f * [1, 1, 0])
+    return Scene([Frame(known, 1)])
+
+
+def test_the_mean_is_that_of_the_integrand_where_the_target_sees_it() -> None:
+    scene = dark_target()
+    report = audit_estimator(lambda index, chance: initial(Pixels(scene.now, index), chance), scene)
+    assert report.unbiased
+    np.testing.assert_allclose(report.mean, 0, atol=1e-14)
+
+
+def test_what_an_estimator_finds_beyond_its_target_is_a_bias_of_the_mean(monkeypatch) -> None:
+    """8 for 4: the mean counts f in all cells."""
+    monkeypatch.setattr(estimator, "signatures", lambda scene, tolerance: ())
+    scene = dark_target()
+
+    def unselected(index, chance):
+        ((x, W),) = scene.now.candidates(index, chance)
+        return Reservoirs(x, W, np.ones(len(index)))
+
+    np.testing.assert_allclose(audit_estimator(unselected, scene).mean, 1)
 
 
 @pytest.mark.parametrize("name", UNAUDITABLE)

@@ -33,7 +33,7 @@ def spoiled(name: str, value: float) -> dict[str, Any]:
 
 
 BAD = {
-    "no format": (without("format"), "'format' is None", "no dump of a pass"),
+    "no format": (without("format"), "'format' is 'None'", "no dump of a pass"),
     "somebody else's format": (having(format="reservoirs"), "'format' is 'reservoirs'", "not 'restir-ref dump'"),
     "a later version": (having(version=2), "'version' is 2", "reads version 1"),
     "an unknown weight": (having(mis="balance"), "'mis' is 'balance'", "one of 'talbot', 'pairwise'"),

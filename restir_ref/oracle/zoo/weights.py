@@ -27,13 +27,15 @@ def counting_undefined(i: int, q: Density, c: Confidences) -> Array:
     """Talbot weights in which an input that cannot have made y counts as if it were canonical."""
 
     def kept(j: int) -> Array:
-        return np.where(q(j) > 0, q(j), q(c.canonical[0]))
+        return np.where(q(j) > 0, q(j), q(c.canonical[0])) if c.canonical else q(j)
 
     return talbot(i, kept, c)
 
 
 def swapped_pairwise(i: int, q: Density, c: Confidences) -> Array:
-    """Pairwise weights with D_j = C_R q_j + C_N p_hat."""
+    """Pairwise weights with D_j = C_R q_j + C_N p_hat, and c_i / C where there are no pairs."""
+    if not (c.canonical and c.others):
+        return constant(i, q, c)
     p_hat = q(c.canonical[0])
 
     def share(j: int, p: Array) -> Array:
