@@ -7,6 +7,8 @@ import ast
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
+from groups import FOR_TYPES, LOOKS, OWN_MISTAKES
+
 OPERATORS: Mapping[type, type[ast.operator]] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -106,10 +108,12 @@ def call(node: ast.Call) -> Iterator[ast.AST]:
     """Arguments swapped or left out, another function, or no function at all."""
     arguments = [each for each in node.args if not isinstance(each, ast.Starred)]
     yield from (ast.Call(node.func, args, node.keywords) for args in swapped(node.args))
-    yield from (ast.Call(node.func, node.args, rest) for rest in shorter(node.keywords))
+    matter = [each for each in node.keywords if each.arg not in LOOKS | OWN_MISTAKES]
+    for left_out in matter:
+        yield ast.Call(node.func, node.args, [each for each in node.keywords if each is not left_out])
     if len(node.args) > 1:
         yield ast.Call(node.func, node.args[:-1], node.keywords)
-    if not name(node.func)[:1].isupper():
+    if not name(node.func)[:1].isupper() and name(node.func) not in FOR_TYPES:
         yield from arguments if name(node.func) in OF_ALIKE else arguments[:1]
     if isinstance(node.func, ast.Attribute) and not arguments:
         yield node.func.value

@@ -1,0 +1,84 @@
+"""What mutation testing knows about us, as data: groups of modules, the suites that must notice, and what is exempt."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class Group:
+    """Modules (globs of files) and their suite (files or folders of tests, of one marker if it is named).
+
+    `equivalent` says which mutants compute the same, and why; `...` stands for anything.
+    """
+
+    modules: tuple[str, ...]
+    suite: tuple[str, ...]
+    marker: str = ""
+    equivalent: Mapping[str, str] = field(default_factory=dict)
+
+    def files(self) -> Iterator[str]:
+        """The modules' files below the working directory; a package's own file only gathers names."""
+        for pattern in self.modules:
+            yield from sorted(str(path) for path in Path().glob(pattern) if path.name not in OMITTED)
+
+    def tests(self) -> list[str]:
+        """Files of the suite, below the working directory."""
+        found = (
+            path
+            for name in self.suite
+            for path in (Path(name).rglob("test_*.py") if Path(name).is_dir() else [Path(name)])
+        )
+        return sorted(
+            str(path) for path in found if f"mark.{self.marker}" in path.read_text("utf-8") or not self.marker
+        )
+
+
+OMITTED = ("__init__.py", "__main__.py", "page.py")
+"""Names that are gathered, command lines of two statements, and a page of words that is committed and compared whole."""
+
+SAME_DENSITY = "the density of every canonical input is p_hat"
+COMMUTES = "min(a, b) = min(b, a)"
+KERNEL = {
+    "mis._canonical_share: ...canonical[{0 => -1}]...": SAME_DENSITY,
+    "mis._pair: ...canonical[{0 => -1}]...": SAME_DENSITY,
+    "resampling: ONE = {np.array(1) => 1}": "a factor of 1, as an array or not",
+    "resampling.gris: ...minimum({total(...), LARGEST_CONFIDENCE => LARGEST_CONFIDENCE, ...": COMMUTES,
+    "resampling._densities.q: ...inputs[{i => j}]...": "i = j in this branch",
+    "resampling._check_input: for ...source.X.c), ('weight W', source.X.W})):": "which of two mistakes is named first",
+    "restir.reuse_all: ...{Input(X, here), *around(...": "the same sum in another order, equal up to rounding",
+    "restir.capped: ...minimum({X.c, cap => cap, X.c})...": COMMUTES,
+}
+
+THEORY = ("batch", "chance", "integrals", "guards", "loop", "gradient", "decorrelation", "metrics", "counting")
+
+GROUPS: Mapping[str, Group] = MappingProxyType(
+    {
+        "kernel": Group(
+            tuple(f"restir_ref/{name}.py" for name in ("mis", "resampling", "restir", "streaming")),
+            ("tests",),
+            "kernel",
+            KERNEL,
+        ),
+        "theory": Group(tuple(f"restir_ref/{name}.py" for name in THEORY), ("tests/core", "tests/oracle")),
+        "oracle": Group(("restir_ref/oracle/*.py",), ("tests/oracle", "tests/core")),
+        "zoo": Group(("restir_ref/oracle/zoo/*.py",), ("tests/oracle",)),
+        "audit": Group(("restir_ref/audit/*.py",), ("tests/audit",)),
+        "transport": Group(("restir_ref/transport/**/*.py",), ("tests/transport", "tests/flatland")),
+        "toy1d": Group(("toy1d/*.py",), ("tests/core", "tests/toy1d")),
+        "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland", "tests/transport")),
+    }
+)
+
+LOOKS = frozenset(
+    "color ls lw alpha zorder fontsize size ha va pad fraction aspect marker ms cmap edgecolor facecolor figsize label "
+    "linewidth linestyle linewidths labelpad shrink headwidth arrowprops interpolation dpi frameon loc ncols bbox".split()
+)
+"""Keyword arguments that decide what a picture looks like, not what it shows: no test pins a colour or a size."""
+
+OWN_MISTAKES = frozenset(("strict", "stacklevel"))
+"""Keyword arguments that matter only where our own code is wrong: zip(strict=True) stops on lists that never differ."""
+
+FOR_TYPES = frozenset(("asarray", "cast"))
+"""Functions that tell the type checker what a value is already: without them, nothing changes."""
