@@ -15,6 +15,8 @@ from groups import LOOKS, OWN_MISTAKES
 
 KEPT = 60
 """Characters shown on either side of a change."""
+TYPES = ("Callable[", "tuple[", "Array | ")
+"""What a value begins with that is the name of a type."""
 UNCHANGED = ("annotation", "returns", "type_comment", "ctx", "decorator_list")
 
 
@@ -126,17 +128,13 @@ def is_left_alone(node: ast.AST) -> bool:
     match node:
         case ast.Import() | ast.ImportFrom() | ast.JoinedStr() | ast.Raise() | ast.Expr(value=ast.Constant()):
             return True
-        case ast.Assign(value=ast.Subscript(value=ast.Name(id="Callable" | "tuple"))):
-            return True
-        case ast.Assign(value=ast.BinOp(left=ast.Name(id="Array"), op=ast.BitOr())):
-            return True
         case ast.Assign(targets=[ast.Name(id="__all__")]) | ast.If(test=ast.Name(id="TYPE_CHECKING")):
             return True
         case ast.ClassDef(bases=[ast.Name(id="Protocol")]):
             return True
         case ast.keyword(arg=word):
             return word in LOOKS | OWN_MISTAKES
-    return False
+    return isinstance(node, ast.Assign) and ast.unparse(node.value).startswith(TYPES)
 
 
 def within(node: ast.AST, scope: str, types: Mapping[str, str]) -> tuple[str, Mapping[str, str]]:

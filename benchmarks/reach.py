@@ -110,7 +110,7 @@ class Kept:
         self.path = path
         path.parent.mkdir(parents=True, exist_ok=True)
         lines = path.read_text("utf-8").splitlines() if path.exists() else []
-        self.values: dict[str, Any] = {key: value for key, value in map(json.loads, lines)}
+        self.values: dict[str, Any] = dict(map(json.loads, lines))
 
     def __setitem__(self, key: str, value: Any) -> None:
         self.values[key] = value
