@@ -206,8 +206,14 @@ def shorter(items: list[Any]) -> list[list[Any]]:
 
 
 def swapped(items: list[Any]) -> list[list[Any]]:
-    """All lists with two neighbours swapped."""
-    return [[*items[:k], items[k + 1], items[k], *items[k + 2 :]] for k in range(len(items) - 1)]
+    """All lists with two neighbours swapped that are not both prose."""
+    places = (k for k in range(len(items) - 1) if not (is_prose(items[k]) and is_prose(items[k + 1])))
+    return [[*items[:k], items[k + 1], items[k], *items[k + 2 :]] for k in places]
+
+
+def is_prose(node: ast.AST) -> bool:
+    """Whether a node is a text of several words."""
+    return isinstance(node, ast.Constant) and " " in str(node.value)
 
 
 def name(node: ast.AST) -> str:

@@ -1,10 +1,10 @@
 """Mutation testing: does a quick law fail for every small change of our code?
 
-    python benchmarks/mutants.py [--jobs 2] [--sample 200] [--only restir_ref/metrics.py ...] [kernel theory ...]
+    python benchmarks/mutants.py [kernel theory ...] [--sample 200] [--only restir_ref/metrics.py ...] [--jobs 2]
 
 Every mutant (made by `mutations.py`, in memory) meets tests of its group's suite (`groups.py`) in a forked
 child that imports the changed module instead of the real one, in a copy of the checkout: those that reach
-the changed function, for six seconds (`reach.py`).  It is *killed* when a test fails or time runs out.
+the changed function, for `--budget` seconds (`reach.py`).  It is *killed* when a test fails or time runs out.
 Groups say which mutants no test can kill, and why.  Exits with 1 if more than one in twenty of the others
 survives, or if that list is wrong.
 
@@ -58,8 +58,8 @@ PASSED = (0, 5)
 FORK = multiprocessing.get_context("fork")
 KILLS: Counter[str] = Counter()
 """How many mutants each test has killed: the next one meets the likeliest killer first."""
-TESTS: list[Reached] = []
-"""The suite of the group at hand; children inherit it."""
+SUITE: list[Any] = [[], 6.0]
+"""The tests of the group at hand and their budget in seconds; children inherit it."""
 
 
 class Verdict(NamedTuple):
@@ -149,7 +149,7 @@ def heard(target: Callable[..., None], *arguments: object) -> Iterator[Any]:
 
 def verdict(mutant: Mutant) -> Verdict:
     """What the tests that reach a mutant say."""
-    chosen = suite(mutant.module, mutant.scope, TESTS, KILLS)
+    chosen = suite(mutant.module, mutant.scope, KILLS, *SUITE)
     said: Verdict = next(heard(child, mutant, chosen)) if chosen else Verdict("", "no test reaches it", 0.0)
     KILLS[said.test] += 1
     return said
@@ -227,7 +227,9 @@ def remembered(group: Group, mutant: Mutant, kept: Kept) -> Verdict | None:
 def grounds(group: Group, mutant: Mutant, said: Verdict) -> str:
     """What a verdict rests on: the mutant, and the file of the test that kills it, or all tests."""
     file = said.test.partition("::")[0]
-    return digest(mutant.source, *([file] if Path(file).is_file() else group.tests()))
+    if Path(file).is_file():
+        return digest(mutant.source, file)
+    return digest(f"{SUITE[1]} {mutant.source}", *group.tests())
 
 
 def summary(fates: Sequence[Fate], of: int) -> float:
@@ -265,8 +267,8 @@ def wrongly_listed(group: Group, fates: Sequence[Fate], everything: Sequence[Mut
 def run(name: str, options: argparse.Namespace) -> int:
     """One group, in the copy: 0 if enough mutants are killed."""
     start, group, kept = perf_counter(), GROUPS[name], Kept(ROOT / "out" / "mutants" / f"{name}.jsonl")
-    TESTS[:] = reached(group)
-    print(f"{name}: {len(TESTS)} tests, {perf_counter() - start:.0f} s to see what they reach", flush=True)
+    SUITE[:] = reached(group), options.budget
+    print(f"{name}: {len(SUITE[0])} tests, {perf_counter() - start:.0f} s to see what they reach", flush=True)
     files = [file for file in group.files() if file in (options.only or [file])]
     everything = [each for file in files for each in mutants(file, Path(file).read_text(encoding="utf-8"))]
     sample = Random(name).sample(everything, min(options.sample or len(everything), len(everything)))
@@ -282,6 +284,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("groups", nargs="*", default=["kernel"], help=f"{', '.join(GROUPS)}; the kernel by default")
     parser.add_argument("--jobs", type=int, default=1, help="children at a time")
     parser.add_argument("--sample", type=int, default=0, help="mutants of each group, drawn at random; all by default")
+    parser.add_argument("--budget", type=float, default=6, help="seconds of tests for each mutant; 6 by default")
     parser.add_argument("--only", nargs="+", metavar="FILE", help="some of the groups' modules")
     parser.add_argument("--afresh", action="store_true", help="forget what was found before")
     options = parser.parse_args(arguments)

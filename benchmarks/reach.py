@@ -1,7 +1,7 @@
 """Which tests reach which functions, and how long they take: measured once per file of tests, then kept.
 
-A mutant then meets only tests that call what it changes: those that call it themselves come first, and of
-these the files named after its module, then the quickest, until six seconds are spent.
+A mutant then meets only tests that call what it changes: those that have killed before come first, then those
+that call it themselves, of these the files named after its module, and then the quickest, while time lasts.
 """
 
 import json
@@ -14,8 +14,6 @@ from types import CodeType, FrameType
 from typing import Any, NamedTuple
 
 OURS = ("restir_ref", "toy1d", "flatland2d")
-BUDGET = 6.0
-"""Seconds of tests for one mutant; the first test may take longer."""
 
 
 class Reached(NamedTuple):
@@ -79,8 +77,8 @@ def together(told: Iterable[tuple[str, float, list[str]]]) -> list[Reached]:
     return [Reached(test, seconds, frozenset(names), file) for test, seconds, names in told if test]
 
 
-def suite(module: str, scope: str, tests: Iterable[Reached], kills: Mapping[str, int]) -> list[str]:
-    """Tests that reach a scope, the likeliest killer first, as many as are quick enough together."""
+def suite(module: str, scope: str, kills: Mapping[str, int], tests: Iterable[Reached], budget: float) -> list[str]:
+    """Tests that reach a scope, the likeliest killer first, as many as are quick enough together, at least one."""
     word = module.rpartition(".")[2]
 
     def rank(each: Reached) -> tuple[Any, ...]:
@@ -90,7 +88,7 @@ def suite(module: str, scope: str, tests: Iterable[Reached], kills: Mapping[str,
     spent, chosen = 0.0, list[str]()
     for each in sorted((each for each in tests if touches(scope, each.file)), key=rank):
         spent += each.seconds
-        if not chosen or spent < BUDGET:
+        if not chosen or spent < budget:
             chosen.append(each.test)
     return chosen
 

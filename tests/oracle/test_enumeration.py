@@ -9,9 +9,9 @@ from restir_ref.oracle.enumeration import outcomes
 
 @pytest.fixture
 def one_by_one(monkeypatch):
-    """Every lane is a batch of its own, and one dive estimates what is below it."""
+    """Every lane is a batch of its own, and two dives estimate what is below it."""
     monkeypatch.setattr(enumeration, "LANES_AT_ONCE", 1)
-    monkeypatch.setattr(enumeration, "DIVES", 1)
+    monkeypatch.setattr(enumeration, "DIVES", 2)
 
 
 def leaves_before_refusal(program, limit: int, match: str) -> int:
@@ -57,22 +57,26 @@ def branches(*options: tuple[int, int]):
     return program
 
 
-PROMISED, REACHED = "would have about 1e[+]03 leaves", "at least 5.. leaves"
+PROMISED, REACHED = "would have about 2e[+]03 leaves", "at least 10.. leaves"
 
 
 @pytest.mark.parametrize(
     ("first", "second", "match"),
     [
-        (91, (101, 9), PROMISED),  # 91 + 101 * 9 + 1 = 1001
-        (90, (101, 9), REACHED),  # 1000, which is not beyond
-        (92, (100, 20), REACHED),  # 2093, but a split into 100 asks for no estimate
+        (191, (201, 9), PROMISED),  # 191 + 201 * 9 + 1 = 2001
+        (190, (201, 9), REACHED),  # 2000, which is not beyond
+        (192, (200, 20), REACHED),  # 4193, but a split into 200 asks for no estimate
     ],
 )
 def test_leaves_found_and_promised_by_open_lanes_are_refused_beyond_twice_the_limit(
     one_by_one, first, second, match
 ) -> None:
-    found = leaves_before_refusal(branches((1, 1), second, (first, 1)), 500, match)
+    found = leaves_before_refusal(branches((1, 1), second, (first, 1)), 1000, match)
     assert (found == first) == (match == PROMISED)
+
+
+def test_an_estimate_within_twice_the_limit_stops_nothing_that_is_at_the_limit(one_by_one) -> None:
+    assert len(list(outcomes(branches((201, 1)), 1, most_leaves=201))) == 201
 
 
 def test_an_enumeration_that_is_refused_at_once_says_how_many_leaves_there_will_be(one_by_one) -> None:
