@@ -62,7 +62,6 @@ ORACLE = {
     "selected._abscissae: ...{ + STEP => }...": TAIL,
     "selected._abscissae: ...{50 => 49}...": TAIL,
     "selected._abscissae: ...{50 => 51}...": TAIL,
-    "selected.probability: norm = ...": TAIL,
     "selected.probability: t = _abscissae(norm, ...P...": "cells that are never drawn lengthen the range of t at most",
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }

@@ -88,3 +88,9 @@ def test_dives_estimate_the_leaves_of_unequal_branches_without_bias() -> None:
     """Half of the dives go into either branch."""
     estimate = enumeration._estimate(branches((2, 3), (8, 5)), [enumeration.Lanes([], np.ones(1))], 1)
     assert estimate == pytest.approx(2 * 3 + 8 * 5, rel=0.1)
+
+
+@pytest.mark.parametrize(("n", "count"), [(64, r"1.844674e\+19"), (2000, r"1e\+300")])
+def test_more_combinations_than_integers_or_floats_hold_are_refused(n, count) -> None:
+    with pytest.raises(ValueError, match=f"at least {count} leaves"):
+        list(outcomes(ten_coins, n))
