@@ -65,6 +65,11 @@ ORACLE = {
     "selected.probability: t = _abscissae(norm, ...P...": "cells that are never drawn lengthen the range of t at most",
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }
+OF_THEORY = {
+    "metrics.neighbour_correlation: ...correlation(errors[..., {:-r], errors[..., r: => r:], errors[..., :-r}])...": (
+        "a correlation is symmetric"
+    ),
+}
 TOY1D = {
     "line.Line.pixel: ...{if index.max(initial=0) < self.n else index  => }% self.n": "the same, more slowly",
     "line.Line.pixel: ...initial={0 => 1}...": "of one pixel, the remainder is 0 as well",

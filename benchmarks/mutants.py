@@ -8,8 +8,8 @@ the changed function, for `--budget` seconds (`reach.py`).  It is *killed* when 
 Groups say which mutants no test can kill, and why.  Exits with 1 if more than one in twenty of the others
 survives, or if that list is wrong.
 
-A sample is random, the same every time, and stands for its group up to the interval that is printed.  What
-was found is kept below `out/mutants/`: a killed mutant stays killed while its module and the test file that
+A sample is random, the same every time and part of any larger one; it stands for its group up to the
+interval that is printed.  What was found is kept below `out/mutants/`: a killed mutant stays killed while its module and the test file that
 killed it are unchanged; one that survived is tried again when anything in its suite has changed.  Other
 modules are not asked: `--afresh` forgets everything.  The kernel takes 8 minutes of one core; Linux.
 """
@@ -271,7 +271,8 @@ def run(name: str, options: argparse.Namespace) -> int:
     print(f"{name}: {len(SUITE[0])} tests, {perf_counter() - start:.0f} s to see what they reach", flush=True)
     files = [file for file in group.files() if file in (options.only or [file])]
     everything = [each for file in files for each in mutants(file, Path(file).read_text(encoding="utf-8"))]
-    sample = Random(name).sample(everything, min(options.sample or len(everything), len(everything)))
+    shuffled = Random(name).sample(everything, len(everything))
+    sample = shuffled[: options.sample] if options.sample else everything
     fates = judged(group, sample, kept, options.jobs)
     score, wrong = summary(fates, len(everything)), wrongly_listed(group, fates, everything)
     print(*wrong, f"{perf_counter() - start:.0f} s by the clock, {options.jobs} at a time", sep="\n", flush=True)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from restir_ref.metrics import MAP, ROW, box_covariance, correlation, low_frequency_ratio, tile_contrast
+from restir_ref.batch import Array
+from restir_ref.metrics import MAP, ROW, band_powers, box_covariance, correlation, low_frequency_ratio, tile_contrast
 
 
 @pytest.mark.parametrize(("shape", "axes"), [((3, 64), ROW), ((16, 16), MAP)])
@@ -18,3 +19,23 @@ def test_images_without_errors_do_not_correlate() -> None:
 
 def test_a_box_of_one_pixel_has_no_other_and_no_covariance() -> None:
     assert box_covariance(np.array([[1.0, 2.0], [3.0, 5.0]]), np.ones(2), radius=0) == 0
+
+
+def errors(*shape: int) -> Array:
+    return np.random.default_rng(3).standard_normal(shape)
+
+
+@pytest.mark.parametrize(("shape", "axes"), [((3, 64), ROW), ((2, 3, 64), ROW), ((3, 16, 16), MAP)])
+def test_spectra_of_several_images_are_those_of_each(shape, axes) -> None:
+    many = errors(*shape)
+    images = [many[at] for at in np.ndindex(shape[: -len(axes)])]
+    ratios, bands = low_frequency_ratio(many, axes), band_powers(many, 0.5, axes)
+    assert ratios.ravel() == pytest.approx([float(low_frequency_ratio(each, axes)) for each in images])
+    for found, of_each in zip(bands, zip(*(band_powers(each, 0.5, axes) for each in images)), strict=True):
+        assert found.shape == shape[: -len(axes)]
+        assert found.ravel() == pytest.approx(np.array(of_each))
+
+
+def test_the_mean_of_spectra_is_not_that_of_each() -> None:
+    found = low_frequency_ratio(errors(3, 64))
+    assert abs(found - found.mean()).max() > 0.1
