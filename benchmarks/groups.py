@@ -91,7 +91,9 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             KERNEL,
         ),
         "theory": Group(
-            tuple(f"restir_ref/{name}.py" for name in THEORY), ("tests/core/test_*.py", "tests/oracle/test_*.py")
+            tuple(f"restir_ref/{name}.py" for name in THEORY),
+            ("tests/core/test_*.py", "tests/oracle/test_*.py", "tests/flatland/test_gbuffer.py"),
+            equivalent=OF_THEORY,
         ),
         "oracle": Group(
             ("restir_ref/oracle/*.py",), ("tests/oracle/test_*.py", "tests/core/test_*.py"), equivalent=ORACLE

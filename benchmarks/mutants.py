@@ -9,9 +9,10 @@ Groups say which mutants no test can kill, and why.  Exits with 1 if more than o
 survives, or if that list is wrong.
 
 A sample is random, the same every time and part of any larger one; it stands for its group up to the
-interval that is printed.  What was found is kept below `out/mutants/`: a killed mutant stays killed while its module and the test file that
-killed it are unchanged; one that survived is tried again when anything in its suite has changed.  Other
-modules are not asked: `--afresh` forgets everything.  The kernel takes 8 minutes of one core; Linux.
+interval that is printed.  What was found is kept below `out/mutants/`: a killed mutant stays killed while
+its module and the test file that killed it are unchanged; one that survived is tried again when anything in
+its suite has changed.  Other modules are not asked: `--afresh` forgets everything.  The kernel takes 8
+minutes of one core; Linux.
 """
 
 import argparse
