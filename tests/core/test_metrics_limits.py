@@ -41,3 +41,9 @@ def high_band(errors: Array, axes: tuple[int, ...]) -> Array:
 def test_the_mean_of_spectra_is_not_that_of_each() -> None:
     found = low_frequency_ratio(errors(3, 64))
     assert abs(found - found.mean()).max() > 0.1
+
+
+def test_a_box_reaches_eight_pixels_unless_told_otherwise() -> None:
+    images, reference = errors(5, 40), np.ones(40)
+    assert box_covariance(images, reference) == box_covariance(images, reference, radius=8)
+    assert box_covariance(images, reference) != box_covariance(images, reference, radius=9)
