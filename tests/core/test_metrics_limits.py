@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 
 from restir_ref.batch import Array
-from restir_ref.metrics import MAP, ROW, band_powers, box_covariance, correlation, low_frequency_ratio, tile_contrast
+from restir_ref.metrics import (
+    MAP,
+    ROW,
+    band_powers,
+    box_covariance,
+    correlation,
+    low_frequency_ratio,
+    mape,
+    mape_with_floor,
+    rel_mse,
+    rmse,
+    tile_contrast,
+)
 
 
 @pytest.mark.parametrize(("shape", "axes"), [((3, 64), ROW), ((16, 16), MAP)])
@@ -47,3 +59,10 @@ def test_a_box_reaches_eight_pixels_unless_told_otherwise() -> None:
     images, reference = errors(5, 40), np.ones(40)
     assert box_covariance(images, reference) == box_covariance(images, reference, radius=8)
     assert box_covariance(images, reference) != box_covariance(images, reference, radius=9)
+
+
+@pytest.mark.parametrize("metric", [mape, mape_with_floor, rel_mse, rmse])
+def test_what_is_too_dark_and_what_is_too_bright_do_not_cancel(metric) -> None:
+    reference = np.array([2.0, 2.0])
+    one_way, both_ways = metric(np.array([2.5, 2.5]), reference), metric(np.array([1.5, 2.5]), reference)
+    assert both_ways == one_way > 0
