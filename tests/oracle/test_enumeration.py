@@ -91,6 +91,6 @@ def test_dives_estimate_the_leaves_of_unequal_branches_without_bias() -> None:
 
 
 @pytest.mark.parametrize(("n", "count"), [(64, r"1.844674e\+19"), (2000, r"1e\+300")])
-def test_more_combinations_than_integers_or_floats_hold_are_refused(n, count) -> None:
+def test_more_combinations_than_integers_or_floats_hold_are_refused(one_by_one, n, count) -> None:
     with pytest.raises(ValueError, match=f"at least {count} leaves"):
         list(outcomes(ten_coins, n))
