@@ -50,6 +50,7 @@ KERNEL = {
 SHORT_TABLE = "the last axis of a table is its axis 1"
 TRUTH = "True counts as 1"
 TAIL = "where the range of t ends, beyond which 1e-17 is left"
+HEAD = "where the range of t begins, before which 1e-17 is left"
 ORACLE = {
     "scenes.normalised: ...axis={- => }1...": SHORT_TABLE,
     "laws.bias_per_cell: ...{np.where(support, 1, 0) => support}...": TRUTH,
@@ -62,6 +63,10 @@ ORACLE = {
     "selected._abscissae: ...{ + STEP => }...": TAIL,
     "selected._abscissae: ...{50 => 49}...": TAIL,
     "selected._abscissae: ...{50 => 51}...": TAIL,
+    "selected.probability: ...reshape({P => W}.shape)...": "both are of one shape",
+    "selected.probability: norm = n @ (P * w).{sum => max}...": HEAD,
+    "selected.probability: norm = n @ {(P * w) => w}...": HEAD,
+    "selected.probability: norm = n @ ({P => n} * w)...": HEAD,
     "selected.probability: t = _abscissae(norm, ...P...": "cells that are never drawn lengthen the range of t at most",
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }
