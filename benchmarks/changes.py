@@ -50,6 +50,8 @@ NAMES = {
     "ratio": "np.divide",
 }
 KEYS = both_ways(("talbot", "defensive"), ("pairwise", "1/Z")) | {"constant": "talbot"}
+COMMUTATIVE = ("minimum", "maximum", "min", "max")
+"""Functions whose arguments may stand in any order."""
 OF_ALIKE = ("ratio", "minimum", "maximum", "where")
 """Functions any of whose arguments may stand in for the result."""
 
@@ -107,7 +109,8 @@ def guard(node: ast.If) -> Iterator[ast.AST]:
 def call(node: ast.Call) -> Iterator[ast.AST]:
     """Arguments swapped or left out, another function, or no function at all."""
     arguments = [each for each in node.args if not isinstance(each, ast.Starred)]
-    yield from (ast.Call(node.func, args, node.keywords) for args in swapped(node.args))
+    if name(node.func) not in COMMUTATIVE:
+        yield from (ast.Call(node.func, args, node.keywords) for args in swapped(node.args))
     matter = [each for each in node.keywords if each.arg not in LOOKS | OWN_MISTAKES]
     for left_out in matter:
         yield ast.Call(node.func, node.args, [each for each in node.keywords if each is not left_out])
