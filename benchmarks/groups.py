@@ -96,7 +96,7 @@ TOY1D = {
     "line.Line.pixel: ...{if index.max(initial=0) < self.n else index  => }% self.n": "the same, more slowly",
     "line.Line.pixel: ...initial={0 => 1}...": "of one pixel, the remainder is 0 as well",
     "line.Line.pixel: ...initial={0 => -1}...": "indices are not negative",
-    "line._kept_cells: i, j = (np.arange(line.n)[{:, None, None], np.arange(line.n)[None, : => ...": "holes and shifts that keep z are symmetric in i and j",
+    "line._kept_cells: i, j = ...{:, None, None], ...[None, : => None, :, None]...": "shifts that keep z are symmetric",
     "line._kept_cells: ...line.holes({i, j => j, i}, z)...": "holes are symmetric in i and j",
 }
 
