@@ -124,7 +124,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             ("restir_ref/transport/**/*.py",), ("tests/transport/test_*.py", "tests/flatland/test_*.py")
         ),
         "toy1d": Group(("toy1d/*.py",), ("tests/core/test_*.py", "tests/toy1d/test_*.py"), equivalent=TOY1D),
-        "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py", "tests/transport/test_*.py")),
+        "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py",)),
     }
 )
 

@@ -52,7 +52,9 @@ CRASHES = ("TypeError", "NameError", "UnboundLocalError", "AttributeError")
 LEAST = 0.95
 """The least share of mutants that must be killed, of those that are not equivalent."""
 SECONDS, MEMORY = 60, 4 << 30
-"""What a child may use, in seconds and bytes: some mutants enumerate without end."""
+"""What a child may use of the processor and of the memory: some mutants enumerate without end."""
+AT_MOST = 10 * SECONDS
+"""Seconds by the clock, for those that wait without end; a busy machine kills no mutant."""
 PASSED = (0, 5)
 """Exit statuses of pytest: no test failed, or none was left."""
 
@@ -111,13 +113,14 @@ class Observer:
 
 
 def session(plugin: object, *arguments: str) -> int:
-    """Run pytest without a word, and without all the memory."""
+    """Run pytest without a word, and without all the memory and time."""
     import pytest  # noqa: PLC0415  (loaded already, and not before the right profile is chosen)
 
     silence = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(silence, stream)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     return int(pytest.main([*OPTIONS, *arguments], plugins=[plugin]))
 
 
@@ -136,13 +139,13 @@ def heard(target: Callable[..., None], *arguments: object) -> Iterator[Any]:
     process = FORK.Process(target=target, args=(*arguments, there))
     process.start()
     there.close()
-    end = perf_counter() + SECONDS
+    end = perf_counter() + AT_MOST
     try:
         while here.poll(max(0, end - perf_counter())):
             yield here.recv()
-        yield Verdict("the clock", "timeout", SECONDS)
+        yield Verdict("the clock", "timeout", AT_MOST)
     except EOFError:
-        yield Verdict("the system", "crash", 0.0)
+        yield Verdict("the system", "crash or timeout", 0.0)
     finally:
         process.kill()
         process.join()
