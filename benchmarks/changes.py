@@ -7,6 +7,8 @@ import ast
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
+from groups import FOR_TYPES, LOOKS, OWN_MISTAKES
+
 OPERATORS: Mapping[type, type[ast.operator]] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -48,6 +50,8 @@ NAMES = {
     "ratio": "np.divide",
 }
 KEYS = both_ways(("talbot", "defensive"), ("pairwise", "1/Z")) | {"constant": "talbot"}
+COMMUTATIVE = ("minimum", "maximum", "min", "max")
+"""Functions whose arguments may stand in any order."""
 OF_ALIKE = ("ratio", "minimum", "maximum", "where")
 """Functions any of whose arguments may stand in for the result."""
 
@@ -105,11 +109,14 @@ def guard(node: ast.If) -> Iterator[ast.AST]:
 def call(node: ast.Call) -> Iterator[ast.AST]:
     """Arguments swapped or left out, another function, or no function at all."""
     arguments = [each for each in node.args if not isinstance(each, ast.Starred)]
-    yield from (ast.Call(node.func, args, node.keywords) for args in swapped(node.args))
-    yield from (ast.Call(node.func, node.args, rest) for rest in shorter(node.keywords))
+    if name(node.func) not in COMMUTATIVE:
+        yield from (ast.Call(node.func, args, node.keywords) for args in swapped(node.args))
+    matter = [each for each in node.keywords if each.arg not in LOOKS | OWN_MISTAKES]
+    for left_out in matter:
+        yield ast.Call(node.func, node.args, [each for each in node.keywords if each is not left_out])
     if len(node.args) > 1:
         yield ast.Call(node.func, node.args[:-1], node.keywords)
-    if not name(node.func)[:1].isupper():
+    if not name(node.func)[:1].isupper() and name(node.func) not in FOR_TYPES:
         yield from arguments if name(node.func) in OF_ALIKE else arguments[:1]
     if isinstance(node.func, ast.Attribute) and not arguments:
         yield node.func.value
@@ -202,8 +209,14 @@ def shorter(items: list[Any]) -> list[list[Any]]:
 
 
 def swapped(items: list[Any]) -> list[list[Any]]:
-    """All lists with two neighbours swapped."""
-    return [[*items[:k], items[k + 1], items[k], *items[k + 2 :]] for k in range(len(items) - 1)]
+    """All lists with two neighbours swapped that are not both prose."""
+    places = (k for k in range(len(items) - 1) if not (is_prose(items[k]) and is_prose(items[k + 1])))
+    return [[*items[:k], items[k + 1], items[k], *items[k + 2 :]] for k in places]
+
+
+def is_prose(node: ast.AST) -> bool:
+    """Whether a node is a text of several words."""
+    return isinstance(node, ast.Constant) and " " in str(node.value)
 
 
 def name(node: ast.AST) -> str:

@@ -1,6 +1,6 @@
 """All mutants of a module: its source with one small change at one place of its syntax tree.
 
-Types, imports, decorators of classes and words (docstrings and messages) are left alone.
+Types, imports, decorators of classes, words (docstrings and messages) and the looks of pictures are left alone.
 """
 
 import ast
@@ -11,9 +11,12 @@ from functools import partial
 from typing import Any
 
 from changes import changes
+from groups import LOOKS, OWN_MISTAKES
 
 KEPT = 60
 """Characters shown on either side of a change."""
+TYPES = ("Callable[", "tuple[", "Array | ")
+"""What a value begins with that is the name of a type."""
 UNCHANGED = ("annotation", "returns", "type_comment", "ctx", "decorator_list")
 
 
@@ -30,6 +33,11 @@ class Mutant:
     def place(self) -> str:
         """The file and the line."""
         return f"{self.module.replace('.', '/')}.py:{self.line}"
+
+    @property
+    def scope(self) -> str:
+        """The full name of the function around it, of the class or the module if there is none."""
+        return ".".join(filter(None, (self.module, self.name.partition(": ")[0].partition(".")[2])))
 
 
 @dataclass(frozen=True)
@@ -50,8 +58,9 @@ class Place:
         return [name for name, other in self.types.items() if other == kind and name != self.node.id]
 
 
-def mutants(module: str, source: str) -> Iterator[Mutant]:
+def mutants(file: str, source: str) -> Iterator[Mutant]:
     """Every distinct change of a module."""
+    module = file.removesuffix(".py").replace("/", ".")
     tree = ast.parse(source)
     before = ast.unparse(tree)
     seen = {before}
@@ -115,13 +124,17 @@ def slots(node: ast.AST, field: str, value: Any) -> Iterator[tuple[ast.AST, Call
 
 
 def is_left_alone(node: ast.AST) -> bool:
-    """Imports, messages, docstrings, and names for types."""
+    """Imports, messages, docstrings, names for types, what is exported, and how pictures look."""
     match node:
-        case ast.Import() | ast.ImportFrom() | ast.JoinedStr() | ast.Expr(value=ast.Constant()):
+        case ast.Import() | ast.ImportFrom() | ast.JoinedStr() | ast.Raise() | ast.Expr(value=ast.Constant()):
             return True
-        case ast.Assign(value=ast.Subscript(value=ast.Name(id="Callable"))):
+        case ast.Assign(targets=[ast.Name(id="__all__")]) | ast.If(test=ast.Name(id="TYPE_CHECKING")):
             return True
-    return False
+        case ast.ClassDef(bases=[ast.Name(id="Protocol")]):
+            return True
+        case ast.keyword(arg=word):
+            return word in LOOKS | OWN_MISTAKES
+    return isinstance(node, ast.Assign) and ast.unparse(node.value).startswith(TYPES)
 
 
 def within(node: ast.AST, scope: str, types: Mapping[str, str]) -> tuple[str, Mapping[str, str]]:

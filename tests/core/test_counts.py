@@ -94,3 +94,15 @@ def test_canonical_inputs_take_no_shift(name):
         spatial(X, here, [here] * len(neighbours), live(), mis=mis)
 
     assert per_column("shift", pass_over_itself, WEIGHTS[name], 5) == 0
+
+
+def test_counting_changes_no_result():
+    """An image and the one that counts for it, after the same draws."""
+    plain = overlapping_supports()
+    found = []
+    for toy in (plain, Counting(plain)):
+        here = Pixels(toy, np.arange(COLUMNS))
+        X = spatial(initial(here, live()), here, [offset(toy, here.index, 1)], live(2))
+        found.append([X.x, X.W, X.c, toy.target(here.index, X.x), *toy.contribution(here.index, X.x)])
+    assert np.array_equal(*found)
+    assert Counting(plain).n == plain.n

@@ -118,7 +118,9 @@ def test_the_variance_is_that_of_f_over_p_Y_plus_the_mean_variance_of_W_Y_given_
     centre = ratio(scene.v, Y.P)
     between = (f**2 * centre**2 * Y.P).sum(axis=-1) - (f * scene.v).sum(axis=-1) ** 2
     assert split_at(Y, f, centre) == pytest.approx(contribution_variance(Y, f), rel=1e-9, abs=1e-12)
-    assert total_variance(Y, f)[0] == pytest.approx(between, rel=1e-9, abs=1e-12)
+    parts = total_variance(Y, f)
+    assert parts[0] == pytest.approx(between, rel=1e-9, abs=1e-12)
+    assert parts[0] + parts[1] == pytest.approx(contribution_variance(Y, f), rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.claims("GRIS-E31")

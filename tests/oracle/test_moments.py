@@ -7,7 +7,7 @@ from restir_ref.mis import WEIGHTS
 from restir_ref.oracle import moments
 from restir_ref.oracle.enumeration import outcomes
 from restir_ref.oracle.moments import Moments, Source, drawn, operator, resampled
-from restir_ref.oracle.scenes import reference_scene, spatial_loop
+from restir_ref.oracle.scenes import reference_scene, spatial_loop, three_pixel_scene, two_technique_scene
 
 every_weight = pytest.mark.parametrize("name", WEIGHTS)
 
@@ -51,3 +51,9 @@ def test_counting_samples_of_zero_target_as_chosen_is_caught(monkeypatch) -> Non
     """A mistake that once stood here: Talbot hides it, 1/Z does not."""
     monkeypatch.setattr(moments.np, "where", lambda condition, a, b: a)
     assert error("1/Z", 2) > 0.1
+
+
+def test_moments_of_initial_samples_know_one_technique_and_refuse_two() -> None:
+    drawn(three_pixel_scene().now)
+    with pytest.raises(ValueError, match="but this scene has 2"):
+        drawn(two_technique_scene().now)

@@ -1,0 +1,139 @@
+"""What mutation testing knows about us, as data: groups of modules, the suites that must notice, and what is exempt."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class Group:
+    """Modules (globs of files) and their suite (files or folders of tests, of one marker if it is named).
+
+    `equivalent` says which mutants compute the same, and why; `...` stands for anything.
+    """
+
+    modules: tuple[str, ...]
+    suite: tuple[str, ...]
+    marker: str = ""
+    equivalent: Mapping[str, str] = field(default_factory=dict)
+
+    def files(self) -> Iterator[str]:
+        """The modules' files below the working directory; a package's own file only gathers names."""
+        for pattern in self.modules:
+            yield from sorted(str(path) for path in Path().glob(pattern) if path.name not in OMITTED)
+
+    def tests(self) -> list[str]:
+        """Files of the suite, below the working directory."""
+        found = {path for name in self.suite for path in Path().glob(name)}
+        return sorted(
+            str(path) for path in found if not self.marker or f"mark.{self.marker}" in path.read_text("utf-8")
+        )
+
+
+OMITTED = ("__init__.py", "__main__.py", "page.py")
+"""Names that are gathered, command lines of two statements, and pages of words, compared whole with what is kept."""
+
+SAME_DENSITY = "the density of every canonical input is p_hat"
+KERNEL = {
+    "mis._canonical_share: ...canonical[{0 => -1}]...": SAME_DENSITY,
+    "mis._pair: ...canonical[{0 => -1}]...": SAME_DENSITY,
+    "resampling: ONE = {np.array(1) => 1}": "a factor of 1, as an array or not",
+    "resampling._densities.q: ...inputs[{i => j}]...": "i = j in this branch",
+    "resampling._check_input: for ...source.X.c), ('weight W', source.X.W})):": "which of two mistakes is named first",
+}
+
+SHORT_TABLE = "the last axis of a table is its axis 1"
+TRUTH = "True counts as 1"
+TAIL = "where the range of t ends, beyond which 1e-17 is left"
+HEAD = "where the range of t begins, before which 1e-17 is left"
+UNDRAWN = "cells that are never drawn lengthen the range of t at most"
+ORACLE = {
+    "scenes.normalised: ...axis={- => }1...": SHORT_TABLE,
+    "laws.bias_per_cell: ...{np.where(support, 1, 0) => support}...": TRUTH,
+    "mutations.without_T: ...np.where({move.T_ratio > 0, 1 => 1, move.T_ratio > 0}, 0)...": TRUTH,
+    "mutations.without_T: ...{np.where(move.T_ratio > 0, 1, 0) => move.T_ratio > 0}...": TRUTH,
+    "mutations.steps: ...fold(x, x {+ => -} by, K)...": "steps to the left are as many as to the right",
+    "mutations.blue.step: ...[{1 => 0}.0]...": "no energy changes in grey, at whatever distance",
+    "mutations.blue.step: ...[{1 => 2}.0]...": "no energy changes in grey, at whatever distance",
+    "selected._abscissae: ...{+ => -} STEP...": TAIL,
+    "selected._abscissae: ...{ + STEP => }...": TAIL,
+    "selected._abscissae: ...{50 => 49}...": TAIL,
+    "selected._abscissae: ...{50 => 51}...": TAIL,
+    "selected.probability: ...reshape({P => W}.shape)...": "both are of one shape",
+    "selected.probability: norm = n @ (P * w).{sum => max}...": HEAD,
+    "selected.probability: norm = n @ {(P * w) => w}...": HEAD,
+    "selected.probability: norm = n @ ({P => n} * w)...": HEAD,
+    "selected.probability: t = ...{(w > 0) & (P > 0) => w > 0}...": UNDRAWN,
+    "selected.probability: t = ...(P >{ => =} 0)...": UNDRAWN,
+    "selected.probability: t = ...({P => W} > 0)...": UNDRAWN,
+    "selected.probability: t = ...({P => n} > 0)...": UNDRAWN,
+    "selected.probability: t = ...(P > {0 => -1})...": UNDRAWN,
+    "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
+}
+OF_THEORY = {
+    "metrics.neighbour_correlation: ...correlation(errors[..., {:-r], errors[..., r: => r:], errors[..., :-r}])...": (
+        "a correlation is symmetric"
+    ),
+    "metrics._frequencies: ...{, sparse=True => }...": "the same numbers, in more memory",
+}
+AUDIT = {
+    "load._check_values: for name in ('{u', 'u_stream => u_stream', 'u}'):": "which of two mistakes is named first",
+    "mistakes.at_s: ...[{0 => -1}])": "the first of one row is the last",
+    "mistakes.inputs_counted: ...len(p.{W => c})...": "as many confidences as weights",
+}
+ZOO = {
+    "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
+        "the edges of a null column are 0, which start bounds from below"
+    ),
+    "confidence.OneSeed.choose: ...high - low > {1e-14 => -0.99...": "options of rounding's size change no mean",
+    "weights.swapped_pairwise: ...canonical[{0 => -1}]...": SAME_DENSITY,
+    "passes: ...Parts({along=TALBOT, ...": "the default",
+}
+TOY1D = {
+    "walking.Walking.propose: ...np.clip({(x - low) / size, 0 => 0, (x - low) / size}, 1)...": "max(a, b) = max(b, a)",
+    "line.Line.pixel: ...{if index.max(initial=0) < self.n else index  => }% self.n": "the same, more slowly",
+    "line.Line.pixel: ...initial={0 => 1}...": "of one pixel, the remainder is 0 as well",
+    "line.Line.pixel: ...initial={0 => -1}...": "indices are not negative",
+    "line._kept_cells: i, j = ...{:, None, None], ...[None, : => None, :, None]...": "shifts that keep z are symmetric",
+    "line._kept_cells: ...line.holes({i, j => j, i}, z)...": "holes are symmetric in i and j",
+}
+
+THEORY = ("batch", "chance", "integrals", "guards", "loop", "gradient", "decorrelation", "metrics", "counting")
+
+GROUPS: Mapping[str, Group] = MappingProxyType(
+    {
+        "kernel": Group(
+            tuple(f"restir_ref/{name}.py" for name in ("mis", "resampling", "restir", "streaming")),
+            ("tests/**/test_*.py",),
+            "kernel",
+            KERNEL,
+        ),
+        "theory": Group(
+            tuple(f"restir_ref/{name}.py" for name in THEORY),
+            ("tests/core/test_*.py", "tests/oracle/test_*.py", "tests/flatland/test_gbuffer.py"),
+            equivalent=OF_THEORY,
+        ),
+        "oracle": Group(
+            ("restir_ref/oracle/*.py",), ("tests/oracle/test_*.py", "tests/core/test_*.py"), equivalent=ORACLE
+        ),
+        "zoo": Group(("restir_ref/oracle/zoo/*.py",), ("tests/oracle/test_*.py",), equivalent=ZOO),
+        "audit": Group(("restir_ref/audit/*.py",), ("tests/audit/test_*.py",), equivalent=AUDIT),
+        "transport": Group(
+            ("restir_ref/transport/**/*.py",), ("tests/transport/test_*.py", "tests/flatland/test_*.py")
+        ),
+        "toy1d": Group(("toy1d/*.py",), ("tests/core/test_*.py", "tests/toy1d/test_*.py"), equivalent=TOY1D),
+        "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py",)),
+    }
+)
+
+INK = ("color", "colors", "edgecolors", "cmap", "ls", "lw", "linewidths", "capstyle", "marker", "zorder")
+TEXT = ("fontsize", "pad", "bbox", "interpolation", "label", "xlabel", "ylabel")
+LOOKS = frozenset((*INK, *TEXT))
+"""Keyword arguments that decide what a picture looks like and says, not what it shows: no test pins a colour."""
+
+OWN_MISTAKES = frozenset(("strict", "stacklevel"))
+"""Keyword arguments that matter only where our own code is wrong: zip(strict=True) stops on lists that never differ."""
+
+FOR_TYPES = frozenset(("asarray", "cast"))
+"""Functions that tell the type checker what a value is already: without them, nothing changes."""
