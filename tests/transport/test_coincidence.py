@@ -43,7 +43,7 @@ def furnished(space: Space, order: int = 1, lift: float = 0.0) -> Scene:
     return scene(space, [MATTE], [*sides, inset(sides[0], lift)][::order])
 
 
-def mean_light(s: Scene, depth: int = 3, n: int = 40_000) -> float:
+def mean_light(s: Scene, depth: int = 3, n: int = 15_000) -> float:
     """Mean radiance that arrives at points of the room from everywhere; always the same chance."""
     at = Peephole(inside(s, n, 1), directions(s.space.d, n, 2))
     t = Tracer(s, at, depth, RECONNECTION)
