@@ -136,38 +136,6 @@ def test_weights_that_need_a_canonical_input_say_so(name) -> None:
         selected(from_others(three_pixel_scene().now, WEIGHTS[name]), np.ones((1, 3)))
 
 
-def mostly_own() -> Frame:
-    """Pixel 0 has light in four cells of volume 1, pixel 1 in three of them."""
-    f, pdf = np.array([[1.0] * 4, [1.0] * 3 + [0.0]]), np.array([[[1 / 4] * 4, [1 / 3] * 3 + [0.0]]])
-    return Frame(cells(np.ones((2, 4)), f, pdf, paired(2, 4, {(0, 1): (0, 1, 2, -1)})), 2)
-
-
-def with_own_confidence(c: float, mis: Weights) -> float:
-    """E[f(Y) W_Y] of pixel 0 from its own sample, of confidence c, and pixel 1's, of confidence 1; the truth is 4."""
-    frame = mostly_own()
-
-    def loop(index: Array, chance: Chance) -> Reservoirs:
-        at = [Pixels(frame, np.full(len(index), i)) for i in (0, 1)]
-        own, other = (initial(each, chance) for each in at)
-        return gris([Input(replace(own, c=c * own.c), at[0]), Input(other, at[1])], at[0], mis, chance)
-
-    return float(selected(loop, frame.cells.v[:1]).W.sum())
-
-
-@pytest.mark.claims("GRIS-A19")
-@pytest.mark.parametrize("mis", NEEDING_NOBODY.values(), ids=NEEDING_NOBODY)
-def test_where_only_a_sample_of_confidence_zero_can_come_from_is_not_lost_without_a_word(mis) -> None:
-    assert with_own_confidence(1e-6, mis) == pytest.approx(4, rel=1e-9)
-    with pytest.raises(ValueError, match=r"^input 0 has confidence 0 in column \d+, .* a positive confidence"):
-        with_own_confidence(0, mis)
-
-
-@pytest.mark.claims("GRIS-A19")
-@pytest.mark.parametrize("mis", NEEDING_NOBODY.values(), ids=NEEDING_NOBODY)
-def test_weights_that_promise_less_lose_it(mis) -> None:
-    assert with_own_confidence(0, replace(mis, unbiased_for=ALL_CANONICAL)) == pytest.approx(3)
-
-
 # ---------------------------------------------------------------- visibility
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from restir_ref.integrals import Reservoirs
 from restir_ref.mis import WEIGHTS
 from restir_ref.oracle.laws import bias_of
 from restir_ref.oracle.scenes import spatial_loop, three_pixel_scene
@@ -35,3 +36,11 @@ def test_lanes_on_their_own_are_not():
 def halved(X):
     """A bias that no leak explains: the first pixel's weights are halved."""
     return replace(X, W=np.where(np.arange(len(X.W)) % 3 == 0, X.W / 2, X.W))
+
+
+def test_too_long_an_enumeration_is_refused_with_an_estimate_by_the_exact_bias_too():
+    def thirty_tosses(index, chance):
+        return Reservoirs(chance.choose(np.ones((2, len(index)))), np.ones(len(index)), np.ones(len(index)))
+
+    with pytest.raises(ValueError, match=r"at least 1.073742e\+09 leaves, .* probably about 1.1e\+09 in all"):
+        bias_of(thirty_tosses, np.ones((30, 2)), np.ones((30, 2)))
