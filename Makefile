@@ -45,7 +45,7 @@ figures-paper: $(STAMP)  ## the same at the papers' sample counts, into out-pape
 	$(PY) -m figures report --out $(OUT)
 
 test: $(STAMP)  ## run the laws; ARGS="-k name" runs some
-	$(PY) -m pytest $(ARGS)
+	$(PY) -m pytest -n $(JOBS) --dist worksteal $(ARGS)
 
 lint: $(STAMP)  ## ruff and mypy --strict
 	$(PY) -m ruff check
