@@ -94,10 +94,10 @@ def test_a_limit_on_the_result_is_named_with_its_value() -> None:
 
 def test_no_limit_is_guessed_from_one_column_or_from_zeros() -> None:
     dump = alive()
-    highest = dump["W_Y"] == dump["W_Y"].max()
-    halved = np.where(highest & (np.cumsum(highest) == 1), dump["W_Y"].max() / 2, np.minimum(dump["W_Y"], 1e-3))
-    for W_Y in (halved, 0 * dump["W_Y"]):
-        assert not any("clamped" in name for name in named({**dump, "W_Y": W_Y}))
+    whole = ("format", "version", "mis", "canonical")
+    alone = {name: values if name in whole else values[..., :1] for name, values in dump.items()}
+    assert named({**alone, "W_Y": 0.9 * alone["W_Y"]}) == []
+    assert named({**dump, "W_Y": 0 * dump["W_Y"]}) == []
 
 
 # ---------------------------------------------------------------- shares
@@ -138,6 +138,14 @@ def test_beside_a_mistake_that_explains_everything_others_are_not_named(monkeypa
     dump = alive()
     suspecting(12, 20, 18, monkeypatch=monkeypatch)
     assert named({**dump, "W_Y": 2 * dump["W_Y"]}) == ["20"]
+
+
+def test_a_mistake_that_explains_the_first_term_only_says_so(monkeypatch) -> None:
+    dump = alive()
+    suspecting(20, monkeypatch=monkeypatch)
+    report = audit_dump({**dump, "W_Y": 2 * dump["W_Y"], "c_Y": 3 * dump["c_Y"]})
+    assert [each.term for each in report.wrong] == ["W_Y", "c_Y"]
+    assert str(report.explanations[0]) == "20: explains this term in 100% of its columns, but not all others"
 
 
 @pytest.mark.parametrize(("columns", "seen"), [(20, 4), (6, 8), (2, 6)])
