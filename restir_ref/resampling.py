@@ -15,7 +15,7 @@ from restir_ref.batch import Array, pick, ratio, total, wide
 from restir_ref.chance import Chance
 from restir_ref.guards import aligned, apart, nonnegative, per_column
 from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, p_hat_from, shifted, target
-from restir_ref.mis import ALL_CANONICAL, CANONICAL_COVERS, Confidences, Density, Weights
+from restir_ref.mis import ANY, CANONICAL_COVERS, Confidences, Density, Weights
 
 LARGEST_CONFIDENCE = 2.0**100
 """Merged confidences saturate here, so that uncapped ones, which double every frame, stay finite."""
@@ -56,7 +56,7 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
         q = _densities(i, y, p_hat, inputs, here, mis.proxy)
         m = mis.m(i, q, c)
         c_over_m = None if mis.c is None else ratio(mis.c(i, q, c), m)
-        if mis.unbiased_for != ALL_CANONICAL:
+        if mis.unbiased_for == ANY:
             _check_covered(i, (c[i] == 0) & (source.X.W * y.J * p_hat > 0), q, c)
         yield Candidate(y.x, p_hat, m * source.X.W * y.J, c_over_m)
 

@@ -15,7 +15,7 @@ from restir_ref.audit.given import at
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs, Shifted
-from restir_ref.mis import ALL_CANONICAL, Confidences, Density, Weights
+from restir_ref.mis import ALL_CANONICAL, ANY, Confidences, Density, Weights
 from restir_ref.resampling import Candidate, Input, gris, weigh
 from restir_ref.restir import capped
 from restir_ref.streaming import select_streaming
@@ -167,7 +167,8 @@ def recompute(p: Pass, mis: Weights) -> Terms:
         return m[-1]
 
     chance = Deciding(p)
-    Y = gris(inputs, here, replace(mis, m=noted, unbiased_for=ALL_CANONICAL), chance)
+    promise = ALL_CANONICAL if mis.unbiased_for == ANY else mis.unbiased_for  # a dump may have lost samples
+    Y = gris(inputs, here, replace(mis, m=noted, unbiased_for=promise), chance)
     return Terms(p, np.stack(m), chance.w, chance.w.sum(axis=0), Y.x, Y.W, Y.c, chance.clear)
 
 
