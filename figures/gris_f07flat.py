@@ -69,10 +69,10 @@ class Kept(IndirectIntegrals):
     answers: dict[int, tuple[Path, Pixels, Shifted]] = field(default_factory=dict)
 
     def shift(self, x: Path, index: Array, to: Pixels) -> Shifted:
-        """As for indirect light; answers about the last x stay."""
-        if any(of is not x for of, _, _ in self.answers.values()):
+        """As for indirect light; answers about the last x stay, which comes in a new view each time."""
+        if any(of.u.base is not x.u.base for of, _, _ in self.answers.values()):
             self.answers.clear()
-        if id(to) not in self.answers:
+        if x.u.base is None or id(to) not in self.answers:
             self.answers[id(to)] = (x, to, super().shift(x, index, to))
         return self.answers[id(to)][2]
 

@@ -23,8 +23,8 @@ def map_leaves(f: Callable[..., Any], *batches: Any) -> Any:
 
     Raises TypeError for a leaf that is neither an array, a tuple nor a dataclass of them.
     """
-    first = batches[0]
-    if any(type(each) is not type(first) for each in batches[1:]):
+    first, *others = batches
+    if others and any(type(each) is not type(first) for each in others):
         kinds = ", ".join(type(each).__name__ for each in batches)
         raise TypeError(f"batches to be merged must have one structure, but corresponding parts are {kinds}.")
     if first is None:
