@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from restir_ref.audit import audit_dump
+from restir_ref.audit.compare import Check
 from restir_ref.audit.dump import RTOL
 from tests.audit.planted import M, fields
 from tests.audit.shader import dumped
@@ -52,6 +53,14 @@ def test_what_underflows_in_float32_may_be_dumped_as_zero() -> None:
     assert wrong_terms(by_hand([1], [0.99 * TINY], w_sum=0)) == []
     assert wrong_terms(by_hand([1], [1.01 * TINY], w_sum=0)) == ["w_sum"]
     assert wrong_terms(by_hand([1], [0.99 * TINY], w_sum=TINY / 2)) == ["w_sum"]
+
+
+@pytest.mark.parametrize(("tolerances", "place"), [([1e-3, 1e-3, 1e-4], 2), ([0, 0, 0], 1)])
+def test_the_worst_error_is_the_largest_in_units_of_what_is_tolerated(tolerances, place) -> None:
+    found, nothing = np.array([[1e-2, 2e-2, 1e-2]]), np.zeros((1, 3))
+    compared = np.ones((1, 3), dtype=bool)
+    worst = Check("w", nothing, found, compared, np.array([tolerances], dtype=float)).worst()
+    assert (worst.where, worst.found) == ((0, place), found[0, place])
 
 
 # ---------------------------------------------------------------- where

@@ -42,6 +42,13 @@ def test_projecting_what_a_ray_meets_gives_its_place_on_the_film() -> None:
     assert (camera.project(x - w) == np.inf).all()
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_point_level_with_the_eye_is_nowhere_on_the_film(side) -> None:
+    camera = Pinhole((0.0, 0.0), (0.0, 1.0), film=64, n=64)
+    assert camera.project(np.array([[side], [0.0]])) == np.inf
+    assert np.isfinite(camera.project(np.array([[side], [1e-9]])))
+
+
 def back_projection_errors(now: Pinhole, before: Pinhole, m: Motion, scene: str) -> np.ndarray:
     """Pixels between a centre and where the current film shows what the previous one showed at its place."""
     pixel = np.flatnonzero(m.seen)
