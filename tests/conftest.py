@@ -6,6 +6,7 @@ all laws marked `kernel` take five seconds.
 """
 
 import os
+import signal
 
 # Hazard: BLAS reads these when NumPy loads, so they stand before any import that may load it.
 for _library in ("OPENBLAS", "MKL", "OMP", "NUMEXPR"):
@@ -13,6 +14,10 @@ for _library in ("OPENBLAS", "MKL", "OMP", "NUMEXPR"):
 os.environ.setdefault("VECLIB_MAXIMUM_THREADS", "1")
 
 from hypothesis import HealthCheck, Phase, settings
+
+# Hazard: what a shell without job control starts in the background ignores Ctrl-C, and so do its children.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("dev", max_examples=50, deadline=None)
 settings.register_profile("ci", max_examples=40, deadline=None, derandomize=True, print_blob=True)
