@@ -8,13 +8,15 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from figures import audit, cluster, jobs, kept, ledger, registry, report, run, session, showings, tables, verdicts
-from figures.errors import FigureError
-from figures.figure import PRESETS
-from figures.jobs import Crew
-from figures.progress import DISABLE, Progress
-from figures.registry import Entry, Project
-from figures.verdicts import Judged
+from figures.claims import ledger, showings, verdicts
+from figures.claims.errors import FigureError
+from figures.claims.figure import PRESETS
+from figures.claims.verdicts import Judged
+from figures.engine import audit, cluster, jobs, kept, registry, run, session
+from figures.engine.jobs import Crew
+from figures.engine.progress import DISABLE, Progress
+from figures.engine.registry import Entry, Project
+from figures.report import report, tables
 
 SEED = 20220711
 FOLDER = Path("out")

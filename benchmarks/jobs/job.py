@@ -19,8 +19,8 @@ from typing import Any, Protocol
 import numpy as np
 from tqdm import tqdm
 
-from figures import disk, store
-from figures.figure import Arrays
+from figures.claims.figure import Arrays
+from figures.engine import disk, store
 
 ROOT = Path(__file__).parents[2]
 SEED = 20_220_701

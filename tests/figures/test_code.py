@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from figures import code, plan, store
+from figures.engine import code, plan, store
 
 KEY = '{"code": "a", "seed": 1}'
 
@@ -42,13 +42,13 @@ def test_the_digest_sees_statements_but_no_comments(tmp_path, monkeypatch):
         (package / "__init__.py").write_text(text)
         code._syntax.cache_clear()
         code._package.cache_clear()
-        found.append(code.digest("figures.gris_f02", "some_world"))
+        found.append(code.digest("figures.gris.gris_f02", "some_world"))
     assert found[0] == found[1] != found[2]
 
 
 MODULE = """
-from figures import offline
-from figures.flatland import view
+from figures.experiments import offline
+from figures.experiments.flatland import view
 
 SCALE, UNUSED = 2.0, 3.0
 
@@ -99,5 +99,5 @@ def test_the_digest_sees_the_numbers_beside_a_module(tmp_path, monkeypatch):
     found = []
     for number in (1.0, 1.0, 2.0):
         np.savez(package / "__init__.npz", number=number)
-        found.append(code.digest("figures.gris_f02", "other_world"))
+        found.append(code.digest("figures.gris.gris_f02", "other_world"))
     assert found[0] == found[1] != found[2]

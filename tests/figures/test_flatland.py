@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from figures import gris_f14, gris_f17, offline
-from figures.flatland import (
+from figures.experiments import offline
+from figures.experiments.flatland import (
     HYBRID,
     POINTS,
     TEN,
@@ -19,9 +19,10 @@ from figures.flatland import (
     spatial_only,
     view,
 )
-from figures.realtime import MARGIN, METHODS, STEP, costed, inset, widened
-from figures.references import INDIRECT, reference
-from figures.split_light import IndirectIntegrals, direct_film, without_direct
+from figures.experiments.realtime import MARGIN, METHODS, STEP, costed, inset, widened
+from figures.experiments.references import INDIRECT, reference
+from figures.experiments.split_light import IndirectIntegrals, direct_film, without_direct
+from figures.gris import gris_f14, gris_f17
 from flatland2d import PLANE, SCENES
 from flatland2d.scenes import LAMP, chain, matte, room
 from flatland2d.sensors import Pinhole

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from figures import jobs
-from figures.jobs import Job
-from figures.registry import ROOT
+from figures.engine import jobs
+from figures.engine.jobs import Job
+from figures.engine.registry import ROOT
 
 SOUND = "tests.figures.demos.sound"
 WORK = [Job(SOUND, "DEMO-F01", {"chunks": 5, "n": 4}, k, {"first": k}, 1, k) for k in range(5)]

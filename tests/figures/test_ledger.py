@@ -5,9 +5,10 @@ import textwrap
 
 import pytest
 
-from figures import ledger, registry, scan
-from figures.errors import FigureError
-from figures.figure import PRESETS
+from figures.claims import ledger, scan
+from figures.claims.errors import FigureError
+from figures.claims.figure import PRESETS
+from figures.engine import registry
 from tests.figures.project import claim, figures, project
 
 KNOWN = ("A-1", "A-2", "A-3")

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from figures import record, verdicts
-from figures.criteria import above, below, reported, within
-from figures.errors import FigureError
-from figures.figure import VERDICTS, Claim, Conditions, Setup, undeclared, verdict_line, verdict_of, worst
-from figures.ledger import Row
-from figures.record import Check, Record
+from figures.claims import verdicts
+from figures.claims.criteria import above, below, reported, within
+from figures.claims.errors import FigureError
+from figures.claims.figure import VERDICTS, Claim, Conditions, Setup, undeclared, verdict_line, verdict_of, worst
+from figures.claims.ledger import Row
+from figures.engine import record
+from figures.engine.record import Check, Record
 from tests.figures.demos.sound import figure
 
 HIT, MISS = within(0, 0, 1), within(3, 0, 1)

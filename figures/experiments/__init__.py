@@ -1,0 +1,1 @@
+"""What several figures share: exact loops on the line, renderings of flatland, reference images."""
