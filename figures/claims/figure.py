@@ -123,6 +123,14 @@ class Figure:
     version: int = 1
 
 
+@dataclass(frozen=True)
+class Entry:
+    """A figure and the module that holds it."""
+
+    module: str
+    figure: Figure
+
+
 def conditions_of(figure: Figure, id_: str) -> Conditions | None:
     """The conditions of one claim, if any are declared."""
     return next((each for each in figure.conditions if id_ in each.claims), None)

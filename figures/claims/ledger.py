@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from figures.claims.errors import FigureError
-from figures.claims.figure import PRESETS, VERDICTS, Verdict
-from figures.engine.registry import Entry
+from figures.claims.figure import PRESETS, VERDICTS, Entry, Verdict
 
 FORMAT = 1
 TEXTS = ("id", "paper", "class", "source", "sentence", "criterion")

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from figures.claims import scan
 from figures.claims.errors import FigureError
+from figures.claims.figure import Entry
 from figures.claims.ledger import Row
-from figures.engine.registry import Entry, Project
 
 Kind = Literal["tests", "figures", "evidence", "benchmark"]
 KINDS: tuple[Kind, ...] = ("tests", "figures", "evidence", "benchmark")
@@ -28,17 +28,22 @@ class Showing:
     part: str = ""
 
 
-def showings(project: Project, rows: Mapping[str, Row], entries: Mapping[str, Entry]) -> dict[str, list[Showing]]:
-    """Claim id -> all that shows it; raises FigureError for a mark with an unknown claim."""
+def showings(
+    tests: Path, benchmarks: Path, rows: Mapping[str, Row], entries: Mapping[str, Entry]
+) -> dict[str, list[Showing]]:
+    """Claim id -> all that shows it, in both folders and among the figures.
+
+    Raises FigureError for a mark with an unknown claim.
+    """
     found: dict[str, list[Showing]] = {id_: [] for id_ in rows}
-    for id_, marks in scan.marks_by_claim(project.tests, rows).items():
+    for id_, marks in scan.marks_by_claim(tests, rows).items():
         found[id_] += [Showing("tests", mark.test, mark.world, mark.part) for mark in marks]
     for entry in entries.values():
         for id_ in entry.figure.claims:
             found[id_].append(Showing("figures", entry.figure.id, entry.figure.world))
-    for id_, jobs in evidence_by_claim(project.benchmarks / EVIDENCE).items():
+    for id_, jobs in evidence_by_claim(benchmarks / EVIDENCE).items():
         found.setdefault(id_, []).extend(Showing("evidence", job, JOBS_WORLD) for job in jobs)
-    for id_, scripts in scan.benchmarks_by_claim(project.benchmarks).items():
+    for id_, scripts in scan.benchmarks_by_claim(benchmarks).items():
         found.setdefault(id_, []).extend(Showing("benchmark", script, JOBS_WORLD) for script in scripts)
     return found
 

@@ -1,19 +1,45 @@
 """Verdicts of claims over all figures of a folder, compared with what the ledger expects."""
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from figures.claims.errors import FigureError
 from figures.claims.figure import VERDICTS, Verdict, worst
 from figures.claims.ledger import Row
-from figures.engine import disk
-from figures.engine.record import Check, Record
 
-FORMAT = 1
-NAME = "verdicts.json"
+Status = Literal["done", "crashed"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One claim of a figure as it was judged; what is not judged was not measured."""
+
+    id: str
+    part: str
+    sentence: str
+    measured: float | str
+    criterion: str
+    verdict: Verdict
+    caveat: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Record:
+    """One figure of one run: what it is, how it went, and what it found."""
+
+    id: str
+    title: str
+    source: str
+    world: str
+    preset: str
+    seed: int
+    version: int
+    claims: Sequence[str]
+    conditions: Sequence[Mapping[str, Any]]
+    status: Status
+    traceback: str
+    checks: Sequence[Check]
 
 
 @dataclass(frozen=True)
@@ -63,27 +89,3 @@ def _agrees(verdict: Verdict | None, expected: Verdict | None, *, exactly: bool)
     if verdict is None or expected is None:
         return None
     return verdict == expected if exactly else VERDICTS.index(verdict) <= VERDICTS.index(expected)
-
-
-def write(judged: Iterable[Judged], out: Path) -> None:
-    """Keep the verdicts in the folder."""
-    data = {"format": FORMAT, "verdicts": [_plain(row) for row in judged]}
-    disk.write_text(out / NAME, json.dumps(data, indent=1) + "\n")
-
-
-def _plain(row: Judged) -> dict[str, Any]:
-    checks = [{"figure": figure, **vars(check)} for figure, check in row.checks]
-    return {**vars(row), "figures": list(row.figures), "checks": checks}
-
-
-def read(out: Path) -> dict[str, Verdict]:
-    """Claim id -> worst verdict kept in the folder; empty if there is none."""
-    path = out / NAME
-    if not path.exists():
-        return {}
-    try:
-        rows = json.loads(path.read_text(encoding="utf-8"))["verdicts"]
-        pairs = [(str(row["id"]), row["verdict"]) for row in rows if row["verdict"] is not None]
-        return {id_: worst([verdict for other, verdict in pairs if other == id_]) for id_, _ in pairs}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FigureError(f"{path} is damaged ({error}): `report` writes it anew") from error

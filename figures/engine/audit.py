@@ -5,15 +5,15 @@ from dataclasses import asdict
 from pathlib import Path
 
 from figures.claims import coverage, verdicts
+from figures.claims.figure import Entry
 from figures.claims.ledger import Row
 from figures.engine import gather, kept, registry
-from figures.engine.registry import Entry, Project
 
 
-def problems(project: Project, rows: Mapping[str, Row], entries: Mapping[str, Entry], out: Path) -> Iterator[str]:
-    """Everything amiss, in words: each line names what to mend."""
+def problems(paper: Path, rows: Mapping[str, Row], entries: Mapping[str, Entry], out: Path) -> Iterator[str]:
+    """Everything amiss, in words: each line names what to mend.  `paper` is the file of kept paper runs."""
     yield from criteria(rows)
-    runs = kept.read(project.paper)
+    runs = kept.read(paper)
     yield from kept.stale(runs, entries)
     yield from kept.unexpected(runs, entries, rows)
     if out.is_dir():
@@ -42,11 +42,18 @@ def results(
     yield from kept.dropped(runs, shown)
 
 
-def remarks(project: Project, entries: Mapping[str, Entry]) -> Iterator[str]:
+def remarks(paper: Path, entries: Mapping[str, Entry]) -> Iterator[str]:
     """What is told without being amiss."""
-    runs = kept.read(project.paper)
+    runs = kept.read(paper)
     older, missing = kept.older(runs, entries), kept.missing(runs, entries)
     if missing:
         yield f"{len(missing)} figures have no kept paper run yet: {', '.join(missing)}; make figures-paper"
     if older:
         yield f"{len(older)} paper runs were computed by other theory or worlds than today's: {', '.join(older)}"
+
+
+def misfits(out: Path, ledger: Mapping[str, Row], entries: Mapping[str, Entry], paper: Path) -> list[str]:
+    """What of a folder of results, and of the ledger, does not fit the kept runs of the paper preset, in words."""
+    kept_runs = kept.read(paper)
+    records = [each.record for each in gather.gather(out) if each.record is not None]
+    return [*kept.dropped(kept_runs, records), *kept.unexpected(kept_runs, entries, ledger)]

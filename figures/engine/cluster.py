@@ -15,10 +15,10 @@ from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
 from figures.claims.errors import FigureError
+from figures.claims.figure import Entry
 from figures.engine import preflight
 from figures.engine.jobs import Crew, Lost
 from figures.engine.preflight import Identity, Work
-from figures.engine.registry import Entry
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -1,27 +1,29 @@
 """From stored chunks to results: combine, judge, draw, and keep everything in the figure's folder."""
 
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from figures.claims.criteria import Void
-from figures.claims.figure import Arrays, Claim, conditions_of, undeclared, verdict_line
+from figures.claims.figure import Arrays, Claim, Figure, undeclared
 from figures.claims.ledger import Row
+from figures.claims.verdicts import Record
 from figures.engine import disk, record, store
 from figures.engine.plan import Plan, arms, arrays_path, key, read_chunks
-from figures.engine.record import Record
-from figures.report import style
+
+Draw = Callable[[Figure, Arrays, Sequence[Claim]], Mapping[str, bytes]]
+"""A figure, its arrays and its judged claims -> files of pictures by name; drawing is nothing the engine knows."""
 
 
-def finish(plan: Plan, ledger: Mapping[str, Row]) -> Record:
+def finish(plan: Plan, ledger: Mapping[str, Row], draw: Draw) -> Record:
     """Make the figure from its chunks; an exception of its own functions becomes a crashed record."""
     chunks = read_chunks(plan)
     try:
         refuse_void(plan, chunks)
         arrays = store.plain(plan.figure.combine(plan.data, chunks))
         claims = judged(plan, arrays)
-        pictures = drawn(plan, arrays, claims)
+        pictures = draw(plan.figure, arrays, claims)
     except Exception:
         return crash(plan, ledger, traceback.format_exc())
     store.save(arrays_path(plan), arrays, key(plan))
@@ -64,11 +66,3 @@ def judged(plan: Plan, arrays: Arrays) -> Sequence[Claim]:
     if problem:
         raise ValueError(f"figure {plan.figure.id} {problem}")
     return claims
-
-
-def drawn(plan: Plan, arrays: Arrays, claims: Sequence[Claim]) -> dict[str, bytes]:
-    """The picture as PNG and PDF, each with the verdicts at its foot."""
-    lines = [verdict_line(claim, conditions_of(plan.figure, claim.id)) for claim in claims]
-    with style.context():
-        picture = style.settled(plan.figure.draw(arrays))
-        return {f"figure.{kind}": style.render(picture, lines, kind) for kind in style.METADATA}

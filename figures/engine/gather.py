@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from figures.claims.errors import FigureError
+from figures.claims.verdicts import Record
 from figures.engine import record, registry, store
-from figures.engine.record import Record
 
 PNG_START, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 

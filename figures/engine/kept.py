@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from figures.claims.errors import FigureError
-from figures.claims.figure import VERDICTS, Verdict, worst
+from figures.claims.figure import VERDICTS, Entry, Verdict, worst
 from figures.claims.ledger import Row
+from figures.claims.verdicts import Record
 from figures.engine import code, disk, manifest, plan, record, registry, store
-from figures.engine.record import Record
-from figures.engine.registry import Entry
 
 FORMAT = 1
 PAPER = "paper"
@@ -85,7 +84,7 @@ def _trouble(folder: Path, entry: Entry) -> str:
 
 def _kept(entry: Entry, found: Record, arrays: Path) -> Kept:
     names = ("id", "part", "measured", "criterion", "verdict", "caveat", "reason")
-    git = manifest.git(registry.ROOT)
+    git = manifest.git(manifest.ROOT)
     commit = f"{git['commit'] or 'unknown'}"[:12] + " (changed)" * bool(git["dirty"])
     return Kept(
         commit,

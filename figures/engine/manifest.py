@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from figures.engine import disk
-from figures.engine.registry import ROOT
 
+ROOT = Path(__file__).resolve().parents[2]
+"""The checkout."""
 FORMAT = 1
 NAME = "manifest.json"
 PROGRAM = "restir-ref figures"

@@ -5,12 +5,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from figures.claims import verdicts
 from figures.claims.errors import FigureError
-from figures.engine import disk, manifest
+from figures.engine import disk, manifest, summary
 
 REPORT = "index.html"
-OWN = {manifest.NAME, verdicts.NAME, REPORT}
+OWN = {manifest.NAME, summary.NAME, REPORT}
 LOCK = ".lock"
 
 

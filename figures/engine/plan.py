@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from figures.claims.errors import FigureError
-from figures.claims.figure import Arrays, Data, Figure
+from figures.claims.figure import Arrays, Data, Entry, Figure
 from figures.engine import code, disk, store
 from figures.engine.jobs import Job
-from figures.engine.registry import Entry
 
 FORMAT = 1
 OF_CODE = frozenset({"code", "data", "chunks", "chunk", "parameters", "stream"})

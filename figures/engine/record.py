@@ -3,52 +3,19 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from dataclasses import fields as dataclass_fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from figures.claims.figure import VERDICTS, Claim, Conditions, Figure, Verdict, conditions_of, verdict_of
+from figures.claims.figure import VERDICTS, Claim, Conditions, Figure, conditions_of, verdict_of
 from figures.claims.ledger import Row
+from figures.claims.verdicts import Check, Record
 from figures.engine import disk
 from figures.engine.plan import Plan
 
 FORMAT = 2
 NAME = "claims.json"
-
-Status = Literal["done", "crashed"]
-
-
-@dataclass(frozen=True)
-class Check:
-    """One claim of a figure as it was judged; what is not judged was not measured."""
-
-    id: str
-    part: str
-    sentence: str
-    measured: float | str
-    criterion: str
-    verdict: Verdict
-    caveat: str
-    reason: str
-
-
-@dataclass(frozen=True)
-class Record:
-    """One figure of one run: what it is, how it went, and what it found."""
-
-    id: str
-    title: str
-    source: str
-    world: str
-    preset: str
-    seed: int
-    version: int
-    claims: Sequence[str]
-    conditions: Sequence[Mapping[str, Any]]
-    status: Status
-    traceback: str
-    checks: Sequence[Check]
 
 
 def record(plan: Plan, claims: Sequence[Claim], ledger: Mapping[str, Row], traceback: str = "") -> Record:

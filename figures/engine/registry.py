@@ -1,87 +1,42 @@
-"""The figures there are: an explicit tuple of modules, imported when asked for."""
+"""The figures there are: the modules that stand in a wing, imported when asked for."""
 
 import difflib
 import importlib
+import pkgutil
 import re
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from importlib.util import find_spec
 
 from figures.claims.errors import FigureError
-from figures.claims.figure import PRESETS, Figure
+from figures.claims.figure import PRESETS, Entry, Figure
 from figures.engine.store import canonical
 
-MODULES: tuple[str, ...] = (
-    "figures.gris.gris_f02",
-    "figures.gris.gris_f03",
-    "figures.gris.gris_f04",
-    "figures.gris.gris_f07",
-    "figures.gris.gris_f07c",
-    "figures.gris.gris_f08",
-    "figures.gris.gris_f09",
-    "figures.gris.gris_f10",
-    "figures.gris.gris_e46",
-    "figures.gris.gris_c06",
-    "figures.gris.gris_c08",
-    "figures.gris.gris_c19",
-    "figures.gris.gris_c21",
-    "figures.trust.zoo",
-    "figures.gradient.gpt_f03",
-    "figures.mcmc.mcmc_1d",
-    "figures.mcmc.mcmc_c09",
-    "figures.gris.gris_t1",
-    "figures.gris.gris_a2",
-    "figures.gris.gris_e33",
-    "figures.gris.gris_e40",
-    "figures.gris.gris_e41",
-    "figures.gris.gris_c15",
-    "figures.gris.gris_c10",
-    "figures.gris.gris_c09",
-    "figures.gris.gris_f17",
-    "figures.gris.gris_f17coat",
-    "figures.gris.gris_f13",
-    "figures.gris.gris_f12",
-    "figures.gris.gris_f11",
-    "figures.gris.gris_f07flat",
-    "figures.gris.gris_f05",
-    "figures.trust.flat_scenes",
-    "figures.gris.gris_f14",
-    "figures.gris.gris_f15di",
-    "figures.gris.gris_f01",
-    "figures.gris.gris_f06",
-    "figures.gris.gris_f09flat",
-    "figures.gris.gris_f15",
-    "figures.gris.gris_c12",
-    "figures.gris.gris_c16",
-    "figures.mcmc.mcmc_e05",
-    "figures.gris.gris_x",
-)
-ROOT = Path(__file__).resolve().parents[2]
 ID = re.compile(r"[A-Z][A-Z0-9]*-[A-Za-z0-9-]+")
+OF_A_PAPER = re.compile(r"f\d")
+"""How the name of a module goes on, after its first underscore, that shows a numbered figure of a paper."""
 
 
-@dataclass(frozen=True)
-class Project:
-    """Where the engine finds figures, claims, tests and what long runs found; the commands of tests use another one."""
-
-    modules: tuple[str, ...] = MODULES
-    ledger: Path = ROOT / "figures" / "ledger.json"
-    tests: Path = ROOT / "tests"
-    paper: Path = ROOT / "figures" / "paper.json"
-    benchmarks: Path = ROOT / "benchmarks"
+def standing(wings: Iterable[str]) -> tuple[str, ...]:
+    """The modules in the packages, wing by wing: numbered figures of the paper first, each kind by name and number."""
+    return tuple(f"{wing}.{name}" for wing in wings for name in sorted(_modules(wing), key=_place))
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A figure and the module that holds it."""
+def _modules(wing: str) -> Iterator[str]:
+    spec = find_spec(wing)
+    folders = (spec.submodule_search_locations if spec else None) or []
+    yield from (module.name for module in pkgutil.iter_modules(folders))
 
-    module: str
-    figure: Figure
+
+def _place(name: str) -> tuple[bool, list[tuple[int, str]]]:
+    """The order of gris_f02 and gris_f10 is that of 2 and 10, and gris_c06 comes after both."""
+    rest = name.partition("_")[2] or name
+    pieces = re.findall(r"(\d*)(\D*)", rest)
+    return not OF_A_PAPER.match(rest), [(int(number or 0), word) for number, word in pieces]
 
 
 def load(modules: Iterable[str]) -> dict[str, Entry]:
-    """Import the modules: figure id -> entry, in the order of the registry."""
+    """Import the modules: figure id -> entry, in the order given."""
     entries: dict[str, Entry] = {}
     for entry in map(_import, modules):
         id_ = entry.figure.id
@@ -93,9 +48,14 @@ def load(modules: Iterable[str]) -> dict[str, Entry]:
 
 def _import(name: str) -> Entry:
     try:
-        figure = importlib.import_module(name).FIGURE
+        figure = vars(importlib.import_module(name)).get("FIGURE")
     except Exception as error:
         raise FigureError(f"cannot import figure module {name}:\n{traceback.format_exc()}") from error
+    if not isinstance(figure, Figure):
+        raise FigureError(
+            f"{name} stands among the figures and holds no FIGURE = Figure(...): give it one, "
+            "or move what figures share to figures/experiments/"
+        )
     problems = list(faults(figure))
     if problems:
         raise FigureError(f"{name}.FIGURE: " + "; ".join(problems))
@@ -132,7 +92,7 @@ def _unexplained(figure: Figure) -> Iterator[str]:
 def select(entries: Mapping[str, Entry], ids: Sequence[str]) -> list[Entry]:
     """The entries of the ids in the order asked, each once; all of them if no id is given."""
     if not entries:
-        raise FigureError("there are no figures yet: figures/engine/registry.py lists none")
+        raise FigureError("there are no figures yet: none stands in a wing, such as figures/gris/")
     for id_ in ids:
         if id_ not in entries:
             raise FigureError(f"unknown figure {id_!r}: {_hint(id_, list(entries))}")

@@ -8,14 +8,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from figures.claims.figure import Entry
 from figures.claims.ledger import Row
 from figures.claims.verdicts import Judged
-from figures.engine import jobs, outdir, plan, session, store
+from figures.engine import audit, jobs, outdir, plan, session, store
 from figures.engine.finish import crash, finish
 from figures.engine.progress import Progress
-from figures.engine.registry import Entry
 from figures.engine.session import Request, Session
-from figures.report import report
 
 RESUME = "What was computed is stored: the same command goes on from there"
 
@@ -40,10 +39,10 @@ def run(
         session.note(mine, "running")
         ending = _work(mine, progress)
         session.note(mine, ending.words)
-        judged = report.write(request.out, ledger, registry, paper)
+        judged = request.press.report(request.out)
     if ending.status:
         progress.say(f"{ending.words}. {RESUME}")
-    unfit = any(report.misfits(request.out, ledger, registry, paper))
+    unfit = any(audit.misfits(request.out, ledger, registry, paper))
     return ending.status or _status(mine, judged) or int(unfit), judged
 
 
@@ -98,7 +97,8 @@ def _finish_if_complete(mine: Session, id_: str, progress: Progress) -> None:
     here, start = mine.plans[id_], time.perf_counter()
     if id_ in mine.records or mine.missing[id_]:
         return
-    found = crash(here, mine.ledger, here.trouble) if here.trouble else finish(here, mine.ledger)
+    draw = mine.request.press.draw
+    found = crash(here, mine.ledger, here.trouble) if here.trouble else finish(here, mine.ledger, draw)
     mine.records[id_] = found
     mine.seconds[id_] += time.perf_counter() - start
     progress.say(f"{id_} {found.status} ({mine.reused[id_]} of {len(here.parts)} chunks reused)")

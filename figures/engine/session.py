@@ -5,22 +5,32 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from figures.claims.figure import Entry
 from figures.claims.ledger import Row
+from figures.claims.verdicts import Judged, Record
 from figures.engine import manifest, plan
+from figures.engine.finish import Draw
 from figures.engine.jobs import Crew
 from figures.engine.plan import Plan
-from figures.engine.record import Record
-from figures.engine.registry import Entry
+
+
+@dataclass(frozen=True)
+class Press:
+    """Who makes of results what people look at: a figure's pictures, and the report of a folder with its verdicts."""
+
+    draw: Draw
+    report: Callable[[Path], list[Judged]]
 
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked: figures, preset, root seed, who computes, and the folder of results."""
+    """What was asked: figures, preset, root seed, who computes, who draws and reports, and the folder of results."""
 
     entries: tuple[Entry, ...]
     preset: str
     seed: int
     crew: Crew
+    press: Press
     out: Path
 
 

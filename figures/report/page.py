@@ -11,9 +11,8 @@ from typing import Any
 from figures.claims.criteria import show
 from figures.claims.figure import Verdict, words
 from figures.claims.ledger import Row
-from figures.claims.verdicts import Judged
+from figures.claims.verdicts import Check, Judged, Record
 from figures.engine.gather import Shown
-from figures.engine.record import Check, Record
 
 SYMBOLS: dict[Verdict, str] = {
     "reported": "i",

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from figures.claims import verdicts
 from figures.claims.errors import FigureError
+from figures.claims.figure import Entry
 from figures.claims.ledger import Row
 from figures.claims.verdicts import Judged
-from figures.engine import disk, kept, manifest, registry
+from figures.engine import audit, disk, kept, manifest, registry, summary
 from figures.engine.gather import gather
 from figures.engine.outdir import REPORT
-from figures.engine.registry import Entry
 from figures.report import page
 
 
@@ -22,14 +22,7 @@ def write(out: Path, ledger: Mapping[str, Row], entries: Mapping[str, Entry], pa
     records = [figure.record for figure in shown if figure.record is not None]
     declared, kept_runs = registry.declared(entries), kept.read(paper)
     judged = verdicts.judge(records, ledger, declared)
-    verdicts.write(judged, out)
-    beside = page.Beside(ledger, kept.verdicts(kept_runs, declared), misfits(out, ledger, entries, paper))
+    summary.write(judged, out)
+    beside = page.Beside(ledger, kept.verdicts(kept_runs, declared), audit.misfits(out, ledger, entries, paper))
     disk.write_text(out / REPORT, page.page(shown, judged, beside, manifest.read(out)))
     return judged
-
-
-def misfits(out: Path, ledger: Mapping[str, Row], entries: Mapping[str, Entry], paper: Path) -> list[str]:
-    """What of a folder of results, and of the ledger, does not fit the kept runs of the paper preset, in words."""
-    kept_runs = kept.read(paper)
-    records = [figure.record for figure in gather(out) if figure.record is not None]
-    return [*kept.dropped(kept_runs, records), *kept.unexpected(kept_runs, entries, ledger)]

@@ -14,6 +14,8 @@ import numpy as np
 from cycler import cycler
 from numpy.typing import NDArray
 
+from figures.claims.figure import Arrays, Claim, Figure, conditions_of, verdict_line
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
 
@@ -80,6 +82,14 @@ def panels(
 
     picture = Picture(figsize=(width * columns, height * rows), layout="constrained")
     return picture, picture.subplots(rows, columns, squeeze=False)
+
+
+def drawn(figure: Figure, arrays: Arrays, claims: Sequence[Claim]) -> dict[str, bytes]:
+    """A figure's picture as PNG and PDF, by the names of their files, each with the verdicts at its foot."""
+    lines = [verdict_line(claim, conditions_of(figure, claim.id)) for claim in claims]
+    with context():
+        picture = settled(figure.draw(arrays))
+        return {f"figure.{kind}": render(picture, lines, kind) for kind in METADATA}
 
 
 def settled(picture: "Picture") -> "Picture":

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from figures.claims.criteria import show
-from figures.claims.figure import VERDICTS, Verdict, words
+from figures.claims.figure import VERDICTS, Entry, Verdict, words
 from figures.claims.ledger import Row
 from figures.claims.showings import KINDS, Showing, as_data
 from figures.claims.verdicts import Judged
 from figures.engine.gather import gather
-from figures.engine.registry import Entry
 
 WIDEST = 44
 

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from figures.claims import coverage, ledger
-from figures.engine import audit, registry
+from figures.engine import audit
+from figures.project import Project
 from tests.figures.project import claim, figures, project
 
 ROW = {"sentence": "On FS1 to FS3 and CB3-glossy", "criterion": "it falls, in flatland and 3D"}
@@ -102,4 +103,4 @@ def test_evidence_that_does_not_hold_shows_nothing(shown):
 
 
 def test_our_own_criteria_name_the_scenes_and_worlds_of_their_rows():
-    assert list(audit.criteria(ledger.load(registry.Project().ledger))) == []
+    assert list(audit.criteria(ledger.load(Project().ledger))) == []

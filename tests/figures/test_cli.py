@@ -10,7 +10,7 @@ import pytest
 
 from figures.cli import main
 from figures.engine import outdir
-from figures.engine.registry import ROOT, Project
+from figures.project import ROOT, Project
 from tests.figures.demos import sound
 from tests.figures.project import claim, figures, project
 

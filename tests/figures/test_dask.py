@@ -15,7 +15,8 @@ import pytest
 
 from figures.claims.errors import FigureError
 from figures.engine import cluster, jobs, preflight
-from figures.engine.registry import ROOT, load
+from figures.engine.registry import load
+from figures.project import ROOT
 from tests.figures.demos import strange
 from tests.figures.demos.stuck import STUCK
 from tests.figures.project import arrays, figures, project

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from figures.claims.coverage import WORDS, missing
-from figures.engine.registry import Project
+from figures.project import Project
 
 ROWS = {row["id"]: row for row in json.loads(Project().ledger.read_text(encoding="utf-8"))["claims"]}
 

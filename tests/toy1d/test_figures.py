@@ -10,9 +10,9 @@ import pytest
 from figures.claims.figure import Arrays, Figure, undeclared, verdict_of, worst
 from figures.claims.ledger import load
 from figures.engine.jobs import stream
-from figures.engine.registry import Project
 from figures.experiments.exact import Loop
 from figures.gris import gris_c06, gris_f09, gris_f10
+from figures.project import Project
 from figures.report import style
 from tests.core.stubs import live
 from toy1d import quotient, two_pixels
