@@ -20,7 +20,7 @@ import numpy as np
 from tqdm import tqdm
 
 from figures.claims.figure import Arrays
-from figures.engine import disk, store
+from figures.engine import disk, store, syntax
 
 ROOT = Path(__file__).parents[2]
 SEED = 20_220_701
@@ -138,19 +138,15 @@ def depends(job: Job) -> str:
 
 @cache
 def code(module: str) -> str:
-    """SHA-256, shortened, over a module and all of ours that it imports: syntax trees without docstrings, and numbers.
+    """SHA-256, shortened, over the statements of a module and of all of ours that it imports, wherever they stand.
 
-    Numbers are those in an `.npz` of the module's name, such as reference images.
+    Numbers count too: those in an `.npz` of the module's name, such as reference images.
     """
-    total = hashlib.sha256()
-    for name in sorted(reached(module)):
-        total.update(_syntax(name))
-        total.update(_numbers(name))
-    return total.hexdigest()[:16]
+    return syntax.total(part for name in reached(module) for part in _syntax(name) | _numbers(name))
 
 
 def reached(module: str) -> set[str]:
-    """The module and everything of ours that it imports, directly or not."""
+    """The module and everything of ours that it imports, directly or not, with the packages these stand in."""
     seen, to_read = {module}, [module]
     while to_read:
         new = _imports(to_read.pop()) - seen
@@ -162,8 +158,9 @@ def reached(module: str) -> set[str]:
 @cache
 def _imports(module: str) -> frozenset[str]:
     nodes = [node for node in ast.walk(_tree(module)) if isinstance(node, ast.ImportFrom) and node.module]
-    names = {name for node in nodes for name in (node.module, *(f"{node.module}.{each.name}" for each in node.names))}
-    return frozenset(name for name in names if name and name.partition(".")[0] in OURS and _file(name))
+    named = [f"{node.module}.{each.name}".split(".") for node in nodes for each in node.names]
+    names = {".".join(parts[:k]) for parts in named for k in range(1, len(parts) + 1)}
+    return frozenset(name for name in names if name.partition(".")[0] in OURS and _file(name))
 
 
 def _file(module: str) -> Path | None:
@@ -179,15 +176,11 @@ def _tree(module: str) -> ast.Module:
 
 
 @cache
-def _syntax(module: str) -> bytes:
-    tree = _tree(module)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
-            node.body = node.body[1:]
-    return hashlib.sha256(ast.dump(tree).encode()).digest()
-
-
-def _numbers(module: str) -> bytes:
+def _syntax(module: str) -> frozenset[bytes]:
     path = _file(module)
-    numbers = path.with_suffix(".npz") if path else None
-    return hashlib.sha256(numbers.read_bytes()).digest() if numbers and numbers.exists() else b""
+    return syntax.statements(path, ROOT) if path else frozenset()
+
+
+def _numbers(module: str) -> frozenset[bytes]:
+    path = _file(module)
+    return syntax.numbers(path) if path else frozenset()

@@ -1,16 +1,18 @@
 """A digest of the code that a figure's chunks depend on, so that results of older code are computed again.
 
 It covers the theory, the figure's world, and of the figure modules what `chunks` and `compute` reach, name by name,
-with the numbers in an `.npz` beside a module.  Comments and layout do not count, nor does what runs after the chunks.
+with the numbers in an `.npz` beside a module.  What runs after the chunks does not count, nor does where code stands
+(`figures.engine.syntax`).
 """
 
 import ast
-import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+
+from figures.engine import syntax
 
 COMPUTING = frozenset({"chunks", "compute"})
 JUDGING = COMPUTING | {"combine", "check"}
@@ -32,30 +34,23 @@ class Source:
 def digest(module: str, world: str) -> str:
     """SHA-256, shortened, over the syntax trees of everything that computes the chunks of `module`."""
     files = [path for name in ("restir_ref", world) for path in _package(name)]
-    return _sum([*(part for path in files for part in (_syntax(path), _data(path))), *_reached(module, COMPUTING)])
+    theory = {part for path in files for part in _syntax(path) | syntax.numbers(path)}
+    return syntax.total(theory | _reached(module, COMPUTING))
 
 
 def own(module: str) -> str:
     """The same over figure modules alone, with what judges: on what a verdict depends besides theory and world."""
-    return _sum(_reached(module, JUDGING))
-
-
-def _sum(parts: Iterable[bytes]) -> str:
-    total = hashlib.sha256()
-    for part in parts:
-        total.update(part)
-    return total.hexdigest()[:16]
+    return syntax.total(_reached(module, JUDGING))
 
 
 @cache
-def _syntax(path: Path) -> bytes:
-    return hashlib.sha256(ast.dump(ast.parse(path.read_bytes())).encode()).digest()
+def _syntax(path: Path) -> frozenset[bytes]:
+    return syntax.statements(path, _root(path))
 
 
-def _data(path: Path) -> bytes:
-    """Numbers that a module keeps in a file of its own name, such as reference images."""
-    numbers = path.with_suffix(".npz")
-    return hashlib.sha256(numbers.read_bytes()).digest() if numbers.exists() else b""
+def _root(path: Path) -> Path:
+    """The folder in which the module's outermost package stands."""
+    return next(folder for folder in path.parents if not (folder / "__init__.py").exists())
 
 
 @cache
@@ -69,14 +64,11 @@ def _package(name: str) -> tuple[Path, ...]:
 # ---------------------------------------------------------------- what a figure uses
 
 
-def _reached(module: str, roots: frozenset[str]) -> Iterator[bytes]:
-    """The statements that the named functions of a figure use, module by module, and the numbers beside each module."""
+def _reached(module: str, roots: frozenset[str]) -> frozenset[bytes]:
+    """The statements that the named functions of a figure use, and the numbers beside the modules they stand in."""
     places = _closure(list(_called(module, roots)))
-    for each in sorted({where for where, _ in places}):
-        source = _source(each)
-        used = {id(node): node for where, name in places if where == each for node in source.binding.get(name, [])}
-        yield from (ast.dump(node).encode() for node in sorted(used.values(), key=lambda node: node.lineno))
-        yield _data(source.path)
+    used = {part for where, name in places for part in map(syntax.statement, _source(where).binding.get(name, []))}
+    return frozenset(used).union(*(syntax.numbers(_source(where).path) for where, _ in places))
 
 
 def _called(module: str, roots: frozenset[str]) -> Iterator[Place]:
@@ -141,9 +133,10 @@ def _source(module: str) -> Source:
     path = Path(spec.origin or "") if spec else Path()
     binding: dict[str, list[ast.stmt]] = {}
     imported: dict[str, Place] = {}
-    for node in ast.parse(path.read_bytes()).body:
+    for node in syntax.placeless(path, _root(path)).body:
         for name in _bound(node):
             binding.setdefault(name, []).append(node)
+    for node in ast.parse(path.read_bytes()).body:
         if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "figures":
             imported |= {alias.asname or alias.name: _place(node.module or "", alias.name) for alias in node.names}
     return Source(path, binding, imported)
