@@ -183,8 +183,9 @@ def test_a_cycle_is_noticed(tmp_path):
 
 def listed(root: Path) -> list[str]:
     """Strings outside the figures' wings that name a module of theirs, as a list of figures would."""
-    figures = {module.path.stem for module in modules(root, ("figures",)) if floor(module.name) in PAPERS}
-    others = [module for module in modules(root, ("figures",)) if floor(module.name) not in PAPERS]
+    ours = list(modules(root, ("figures",)))
+    figures = {module.path.stem for module in ours if floor(module.name) in PAPERS} - {"__init__"}
+    others = (module for module in ours if floor(module.name) not in PAPERS)
     strings = ((module.name, text) for module in others for text in constants(module))
     return [f"{by} names {text}" for by, text in strings if re.split(r"[./]", text.removesuffix(".py"))[-1] in figures]
 
