@@ -146,7 +146,7 @@ def code(module: str) -> str:
 
 
 def reached(module: str) -> set[str]:
-    """The module and everything of ours that it imports, directly or not, with the packages these stand in."""
+    """The module and everything of ours that it imports, directly or not."""
     seen, to_read = {module}, [module]
     while to_read:
         new = _imports(to_read.pop()) - seen
@@ -158,9 +158,8 @@ def reached(module: str) -> set[str]:
 @cache
 def _imports(module: str) -> frozenset[str]:
     nodes = [node for node in ast.walk(_tree(module)) if isinstance(node, ast.ImportFrom) and node.module]
-    named = [f"{node.module}.{each.name}".split(".") for node in nodes for each in node.names]
-    names = {".".join(parts[:k]) for parts in named for k in range(1, len(parts) + 1)}
-    return frozenset(name for name in names if name.partition(".")[0] in OURS and _file(name))
+    names = {name for node in nodes for name in (node.module, *(f"{node.module}.{each.name}" for each in node.names))}
+    return frozenset(name for name in names if name and name.partition(".")[0] in OURS and _file(name))
 
 
 def _file(module: str) -> Path | None:

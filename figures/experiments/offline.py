@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from figures.claims.figure import Arrays
-from figures.experiments.flatland import HYBRID, Renderer, estimates, means, offline, path_tracing, view
+from figures.experiments.flatland import HYBRID, view
 from figures.experiments.indirect import IndirectReconnection, darkened
 from figures.experiments.references import INDIRECT, reference
+from figures.experiments.rendering import Renderer, estimates, means, offline, path_tracing
 from figures.experiments.split_light import IndirectIntegrals
 from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array, total

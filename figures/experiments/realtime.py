@@ -13,16 +13,8 @@ from typing import Any
 import numpy as np
 
 from figures.claims.figure import Arrays
-from figures.experiments.flatland import (
-    HYBRID,
-    Traced,
-    estimates,
-    film,
-    means,
-    path_tracing,
-    samples_of_equal_cost,
-    view,
-)
+from figures.experiments.flatland import HYBRID, displaced, view
+from figures.experiments.rendering import Traced, estimates, film, means, path_tracing, samples_of_equal_cost
 from flatland2d import SCENES
 from flatland2d.motion import motion
 from flatland2d.sensors import Pinhole
@@ -136,12 +128,6 @@ def sideways(last: Pinhole) -> list[Pinhole]:
     forward = np.subtract(last.towards, last.eye) / np.linalg.norm(np.subtract(last.towards, last.eye))
     side = STEP * np.array([forward[1], -forward[0]])
     return [displaced(last, (k - FRAMES + 1) * side) for k in range(FRAMES)]
-
-
-def displaced(sensor: Pinhole, by: Array) -> Pinhole:
-    """The sensor moved, looking in the same direction."""
-    eye, towards = np.add(sensor.eye, by), np.add(sensor.towards, by)
-    return replace(sensor, eye=(float(eye[0]), float(eye[1])), towards=(float(towards[0]), float(towards[1])))
 
 
 def inset(images: Array) -> Array:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from figures.claims.figure import Arrays
-from figures.experiments.flatland import HYBRID, Traced, estimates, path_tracing, view
+from figures.experiments.flatland import HYBRID, view
 from figures.experiments.realtime import Method, inset, motion_vectors, moved, widened
+from figures.experiments.rendering import Traced, estimates, path_tracing
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.integrals import Pixels, Reservoirs, Shifted

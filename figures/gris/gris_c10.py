@@ -15,8 +15,8 @@ from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import corners, offline, realtime
 from figures.experiments.flatland import HYBRID
-from figures.experiments.flatland import offline as one_frame
 from figures.experiments.realtime import Method
+from figures.experiments.rendering import offline as one_frame
 from figures.experiments.split_light import IndirectIntegrals
 from figures.report import style
 from flatland2d import SCENES

@@ -14,8 +14,8 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import indirect, offline, realtime, split_light
-from figures.experiments.flatland import means, samples_of_equal_cost
 from figures.experiments.references import reference
+from figures.experiments.rendering import means, samples_of_equal_cost
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Chance

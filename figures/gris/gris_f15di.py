@@ -16,8 +16,9 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import realtime
-from figures.experiments.flatland import means, samples_of_equal_cost, view
+from figures.experiments.flatland import view
 from figures.experiments.references import reference
+from figures.experiments.rendering import means, samples_of_equal_cost
 from figures.report import style
 from flatland2d import SCENES
 from flatland2d.radiosity import render

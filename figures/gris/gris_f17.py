@@ -17,7 +17,8 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import offline
-from figures.experiments.flatland import TEN, means, view
+from figures.experiments.flatland import TEN, view
+from figures.experiments.rendering import means
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Live

@@ -15,7 +15,7 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import offline
-from figures.experiments.flatland import lattice_tracing, means
+from figures.experiments.rendering import lattice_tracing, means
 from figures.gris.gris_f17 import rays_to
 from figures.report import style
 from flatland2d.scenes import matte

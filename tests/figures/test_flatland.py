@@ -6,21 +6,18 @@ import numpy as np
 import pytest
 
 from figures.experiments import offline
-from figures.experiments.flatland import (
-    HYBRID,
+from figures.experiments.flatland import HYBRID, TEN, moving, view
+from figures.experiments.realtime import MARGIN, METHODS, STEP, costed, inset, widened
+from figures.experiments.references import INDIRECT, reference
+from figures.experiments.rendering import (
     POINTS,
-    TEN,
     estimates,
     film,
     lattice_tracing,
-    moving,
     path_tracing,
     samples_of_equal_cost,
     spatial_only,
-    view,
 )
-from figures.experiments.realtime import MARGIN, METHODS, STEP, costed, inset, widened
-from figures.experiments.references import INDIRECT, reference
 from figures.experiments.split_light import IndirectIntegrals, direct_film, without_direct
 from figures.gris import gris_f14, gris_f17
 from flatland2d import PLANE, SCENES
