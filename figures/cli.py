@@ -18,7 +18,7 @@ from figures.engine import audit, cluster, jobs, kept, registry, run, session, s
 from figures.engine.jobs import Crew
 from figures.engine.progress import DISABLE, Progress
 from figures.project import Project
-from figures.report import report, style, tables
+from figures.report import legible, press, report, tables
 
 SEED = 20220711
 FOLDER = Path("out")
@@ -159,7 +159,7 @@ def _run(options: argparse.Namespace, project: Project) -> int:
 
 def _press(rows: Mapping[str, Row], entries: Mapping[str, Entry], paper: Path) -> session.Press:
     """The style of this project's pictures, and its page."""
-    return session.Press(style.drawn, partial(report.write, ledger=rows, entries=entries, paper=paper))
+    return session.Press(press.drawn, partial(report.write, ledger=rows, entries=entries, paper=paper))
 
 
 def _crew(options: argparse.Namespace, chosen: Sequence[Entry], progress: Progress) -> AbstractContextManager[Crew]:
@@ -199,7 +199,7 @@ def _keep(options: argparse.Namespace, project: Project) -> int:
 
 def _audit(options: argparse.Namespace, project: Project) -> int:
     entries, rows = registry.load(project.modules), ledger.load(project.ledger)
-    problems = list(audit.problems(project.paper, rows, entries, options.out))
+    problems = [*audit.problems(project.paper, rows, entries, options.out), *legible.problems(options.out)]
     print("\n".join([*problems, f"{len(problems)} problems" if problems else "nothing to mend"]))
     for line in audit.remarks(project.paper, entries):
         print(line)
