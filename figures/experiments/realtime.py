@@ -72,18 +72,6 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 )
 
 
-LOOKS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
-    {
-        "path tracing": {"color": "#E69F00", "ls": "-."},
-        "ReSTIR GI": {"color": "#56B4E9", "ls": (0, (5, 1, 1, 1, 1, 1))},
-        "reconnection": {"color": "#D55E00", "ls": "--"},
-        "no distance test": {"color": "#000000", "ls": ":"},
-        "hybrid": {"color": "#0072B2", "ls": "-"},
-    }
-)
-"""Lines of the methods in pictures."""
-
-
 def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
     """The last frame of a moving camera, (replicas, n), and its rays per pixel; the scene's inset unless told."""
     asked = Counter[str]()

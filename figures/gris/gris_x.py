@@ -248,7 +248,7 @@ def _table(axis: "Axes", title: str, heads: Sequence[str], names: Sequence[str],
     table.set_fontsize(8)
     for (row, _), cell in table.get_celld().items():
         cell.set_height((2 if row == 0 else 1) / (len(cells) + 2))
-        cell.set_edgecolor("#bbbbbb")
+        cell.set_edgecolor(style.GREY)
 
 
 FIGURE = Figure(

@@ -203,8 +203,7 @@ def shown(bias: Array) -> Array:
 
 
 LOOKS: Mapping[str, dict[str, Any]] = {
-    name: {"color": style.COLOURS[k], "ls": style.LINES[k], "marker": style.MARKERS[k], "label": name}
-    for k, name in enumerate(name for name in WALKS if name != "right, wrapped")
+    name: style.look(name) for name in WALKS if name != "right, wrapped"
 }
 FIGURE = Figure(
     id="MCMC-E06",
