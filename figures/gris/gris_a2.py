@@ -213,14 +213,14 @@ def check_mismatch(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """The three problems side by side."""
-    picture, axes = style.panels(1, 3, height=3.4)
+    picture, axes = style.panels(1, 3, height=3.7)
     draw_candidates(axes[0, 0], a)
     draw_domains(axes[0, 1], a)
     floor = axes[0, 2]
     floor.loglog(a["M_wave"], a["wave"], label="Var$[f(Y) W_Y]$")
     floor.axhline(a["limit"], color=style.INK, ls="--", marker="", lw=1, label=r"limit: Var$[f(X)/\bar p(X)]$")
     floor.set(ylim=(0.05, 0.5), xlabel="candidates $M$", ylabel="variance", title=r"$\hat p$ not proportional to $f$")
-    floor.legend()
+    style.below(floor, ncols=1)
     return picture
 
 
@@ -233,7 +233,7 @@ def draw_candidates(axes: Any, a: Arrays) -> None:
         axes.loglog(a["M"], mean_square, **look | {"ls": ":"})
     axes.set(xlabel="candidates $M$", title="Solid: L1, dotted: mean square")
     axes.set_ylabel(r"distance from $\bar p$ of the law of $Y \neq$ null")
-    axes.legend()
+    style.below(axes)
 
 
 def draw_domains(axes: Any, a: Arrays) -> None:
@@ -247,7 +247,7 @@ def draw_domains(axes: Any, a: Arrays) -> None:
         ylabel=r"distance from the limit (relative)",
         title="Seven overlapping domains",
     )
-    axes.legend()
+    style.below(axes)
 
 
 EXACT = {

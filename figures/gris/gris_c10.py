@@ -204,11 +204,11 @@ def draw(a: Arrays) -> "Picture":
 
 def _profile(axis: "Axes", curves: dict[float, Array], clear: Array) -> None:
     """relMSE of four pixels each."""
-    for d, shade in ((DISTANCES[-1], 0.4), (DISTANCES[1], 1.0)):
+    for d, shade in ((DISTANCES[-1], 0.2), (DISTANCES[1], 0.6)):
         places = np.flatnonzero(clear < d)
         if len(places):
             name = f"nearer than {d:.0%}"
-            axis.axvspan(places[0], places[-1] + 1, color=style.PALE, alpha=shade, lw=0, zorder=0, label=name)
+            axis.axvspan(places[0], places[-1] + 1, color=style.GREY, alpha=shade, lw=0, zorder=0, label=name)
     for d, error in curves.items():
         k, x = DISTANCES.index(d), np.arange(2, len(clear), 4)
         look = style.nth(k)

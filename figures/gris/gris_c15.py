@@ -116,7 +116,7 @@ def _largest(mis: str, over: Array) -> str:
 
 def draw(a: Arrays) -> "Picture":
     """How the variance with both maps compares with the worse map."""
-    picture, axes = style.panels(1, 2, width=4.2, height=3.4)
+    picture, axes = style.panels(1, 2, width=4.2, height=3.8)
     titles = ("Confidence shared by both shifts", "Each shift counted fully")
     for axis, over, title in zip(axes[0], a["over"], titles, strict=True):
         for mis, values in zip(ROBUST, over, strict=True):
@@ -129,7 +129,7 @@ def draw(a: Arrays) -> "Picture":
             title=title,
         )
     for axis in axes[0]:
-        style.below(axis, ncols=4, columnspacing=1)
+        style.below(axis)
     return picture
 
 

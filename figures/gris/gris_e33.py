@@ -202,11 +202,11 @@ def draw(a: Arrays) -> "Picture":
     for k, (problem, mis) in enumerate(DRAWN):
         if mis in ("1/Z", "talbot"):
             label = f"{SHORT[mis]}{problem}".replace("p_hat", r"$\hat p$")
-            look = style.look(mis, **PROBLEMS[problem], label=label)
+            look = style.look(mis, marker=PROBLEMS[problem], label=label)
             draws.loglog(a["draws"], median[k], **look)
     draws.set(xlabel="draws", ylabel="largest $f(Y) W_Y$ so far (median of runs)", title="Unbounded factors")
     for each in (inputs, draws):
-        each.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, handlelength=3.5)
+        style.below(each)
     return picture
 
 
@@ -217,7 +217,8 @@ CAVEATS = {
     " large here is the contribution weight, c_i = 1/|R|; a large m_i is not shown alone.",
 }
 """In what respect a cause is not the paper's."""
-PROBLEMS = {name: {"marker": style.MARKERS[k], "ls": style.LINES[k]} for k, name in enumerate(LINES)}
+PROBLEMS = dict(zip(LINES, style.MARKERS, strict=False))
+"""Problems differ in their markers; colours and dashes are the weights'."""
 SHORT = {"1/Z": "1/Z, ", "talbot": "Talbot, "}
 
 FIGURE = Figure(

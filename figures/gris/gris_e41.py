@@ -227,7 +227,7 @@ def draw(a: Arrays) -> "Picture":
     sticky.set(title="Sticky chain of samples")
     for each in (shares, sticky):
         each.set(xlabel="inputs $M$", ylabel=r"Var$[\sum w]$, relative to $\|\hat p\|^2$")
-        each.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3, handlelength=2.5, columnspacing=1)
+        style.below(each, ncols=3)
     return picture
 
 

@@ -135,7 +135,7 @@ def draw(a: Arrays) -> "Picture":
 
 LOOKS = (
     {"color": style.PURPLE, "ls": "-"},
-    style.look("1/M", marker=None, label=None) | {"ls": style.LOOKS["1/M"].line},
+    {"color": style.LOOKS["1/M"].colour, "ls": style.LOOKS["1/M"].line},
     {"color": style.VERMILLION, "ls": ":"},
 )
 

@@ -144,12 +144,12 @@ def pair(a: Arrays, scene: str, one: str, other: str, mask: Array) -> tuple[Arra
 
 def draw(a: Arrays) -> "Picture":
     """The glossy inset, and where its error lies."""
-    picture, axes = style.panels(1, 3, width=4.0, height=3.2)
+    picture, axes = style.panels(1, 3, width=4.0, height=3.6)
     _strips(axes[0, 0], a)
     _profile(axes[0, 1], a, GLOSSY, "glossy boxes (r = .15)")
     _profile(axes[0, 2], a, ROUGH, "rough boxes (r = .5)")
     for axis in axes[0, 1:]:
-        style.below(axis, ncols=3, columnspacing=1)
+        style.below(axis)
     return picture
 
 
@@ -157,7 +157,7 @@ def _strips(axis: "Axes", a: Arrays) -> None:
     methods = [method for scene, method in RENDERED if scene == GLOSSY]
     rows = [a[f"{GLOSSY}.reference"], *(a[f"{GLOSSY}.{method}.image"] for method in methods)]
     high = 1.5 * a[f"{GLOSSY}.reference"].max()
-    names = [name.replace("no distance", "no distance\n") for name in methods]
+    names = [name.replace("no distance ", "no distance\n") for name in methods]
     style.strips(axis, rows, ["reference", *names], high, 128)
     axis.set(xlabel="pixel: floor, then box", title=f"{GLOSSY}, frame {realtime.FRAMES}")
 

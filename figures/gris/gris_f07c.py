@@ -85,7 +85,7 @@ def check(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """Shifts over the size of the window, and variance over shifts for growing n."""
-    picture, axes = style.panels(1, 2, width=4.2, height=3.2)
+    picture, axes = style.panels(1, 2, width=4.4, height=3.6)
     cost, efficiency = axes[0]
     labels = {"talbot": "Talbot: $M(M-1)$", "pairwise": "pairwise: $2(M-1)$", "defensive": "defensive: $2(M-1)$"}
     fine = np.geomspace(2, 64, 100)
@@ -101,7 +101,7 @@ def draw(a: Arrays) -> "Picture":
     cost.set(xlabel="inputs $M$, $|R| = 1$", ylabel="shifts per pixel", title="Cost of a pass (markers counted)")
     cost.set_xticks([2, 5, 10, 20, 49], ["2", "5", "10", "20", "49"])
     cost.minorticks_off()
-    cost.legend()
+    style.below(cost)
     for k, name in enumerate(PROPER):
         efficiency.loglog(a["shifts_of_n"][k], a["variance"][k], **style.look(name), markevery=1)
     efficiency.set(

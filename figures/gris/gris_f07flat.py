@@ -285,7 +285,7 @@ def draw(a: Arrays) -> "Picture":
         axis.set(xlabel="samples $n$ per pixel", ylabel="relative variance of $f(Y) W_Y$")
         axis.set_title(f"Fig. 7: seven {view}" if "pixels" in view else f"Fig. 7: seven pixels {view}")
     for axis in axes[0, :2]:
-        style.below(axis, ncols=3, columnspacing=1)
+        style.below(axis, ncols=3)
     _growing(axes[0, 2], a)
     return picture
 
@@ -293,19 +293,15 @@ def draw(a: Arrays) -> "Picture":
 def _growing(axis: "Axes", a: Arrays) -> None:
     for view, mis in WIDENED:
         spread = [squared(a[named(view, mis, m)]).mean() for m in a["M"]]
-        look = style.look(mis, **VIEWS[list(GROWING).index(view)], label=f"{mis}, {view}")
+        look = style.look(mis, marker=MARKS[view], label=f"{mis}, {view}")
         axis.loglog(a["M"], spread / spread[0], **look, markevery=1)
     axis.set(xlabel="pixels $M$ in the window", ylabel="relative variance of $f(Y) W_Y$ / of $M = 1$")
     axis.set_title("Fig. 8: one canonical sample")
     style.below(axis, ncols=1)
 
 
-VIEWS: Sequence[dict[str, Any]] = (
-    {"marker": "o", "ls": "-"},
-    {"marker": "s", "ls": "--"},
-    {"marker": "^", "ls": ":"},
-)
-"""Views differ in marker and dash; colours are the weights'."""
+MARKS = dict(zip(GROWING, style.MARKERS, strict=False))
+"""Views differ in their markers; colours and dashes are the weights'."""
 
 
 FIGURE = Figure(

@@ -229,7 +229,7 @@ def _alone(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """Frames of the image and of the ring, stationary error over the cap, and means of frames."""
-    picture, axes = style.panels(2, 2, width=4.4, height=3.4)
+    picture, axes = style.panels(2, 2, width=4.4, height=3.7)
     (frames, ring), (caps, means) = axes
     for k, cap in enumerate(CAPS):
         look = style.look(style.cap(cap), markevery=0.12)
@@ -238,7 +238,7 @@ def draw(a: Arrays) -> "Picture":
     frames.set(xlabel="frame $t$", ylabel="relMSE of frame $t$", title="(a) 64-pixel image, real code")
     ring.set(xlabel="frame $t$", ylabel="relMSE of frame $t$", title="(a) ring of 8 pixels, exact")
     for axis in (frames, ring):
-        style.below(axis, ncols=4, columnspacing=1)
+        style.below(axis, ncols=4)
     _caps(caps, a)
     _means(means, a)
     return picture
@@ -252,8 +252,7 @@ def _caps(axis: Any, a: Arrays) -> None:
     axis.set_xticks(x, ["0", "1", "5", "20", "50", "200", "1000", "no cap"])
     axis.minorticks_off()
     axis.set(xlabel="cap $M_c$", ylabel="relMSE of late frames", title="An optimum only with spatial reuse")
-    axis.set_ylim(2e-4, None)
-    axis.legend(loc="lower left")
+    style.below(axis)
 
 
 def _means(axis: Any, a: Arrays) -> None:
@@ -264,7 +263,7 @@ def _means(axis: Any, a: Arrays) -> None:
         label = f"{style.cap(cap)}, ring, exact"
         axis.loglog(a["t_ring_mean"], error, **style.look(style.cap(cap), marker="", lw=1, label=label))
     axis.set(xlabel="frames averaged $t$", ylabel="relMSE of their mean", title="(b) means of frames")
-    axis.legend()
+    style.below(axis)
 
 
 FIGURE = Figure(

@@ -240,7 +240,7 @@ def _frames(axis: "Axes", a: Arrays) -> None:
         else:
             axis.loglog(a[f"t.{k}"], a[f"frame.{k}"].mean(axis=1), **look)
     axis.set(xlabel="frame $t$", ylabel="relMSE of frame $t$", title="Frames of a still camera")
-    style.below(axis, ncols=4, columnspacing=1)
+    style.below(axis, ncols=4)
 
 
 def _caps(axis: "Axes", a: Arrays) -> None:
@@ -262,7 +262,7 @@ def _means(axis: "Axes", a: Arrays) -> None:
         t, error = a[f"t_mean.{k}"], a[f"mean.{k}"].mean(axis=1)
         axis.loglog(t, error, **look)
     axis.set(xlabel="frames averaged $t$", ylabel="relMSE of their mean", title="Means of frames")
-    axis.legend(loc="lower left")
+    style.below(axis, ncols=4)
 
 
 def _images(axis: "Axes", a: Arrays) -> None:

@@ -79,7 +79,7 @@ def draw(a: Arrays) -> "Picture":
     for k, name in enumerate(NAMES):
         curves.plot(a["mean"][k, 0], **style.look(name, label=f"{name}, mean"))
     curves.set(xlabel="pixel", ylabel="radiance", title="The same run, as curves")
-    style.below(curves, ncols=3, columnspacing=1)
+    style.below(curves, ncols=3)
     for k, name in enumerate(NAMES):
         errors.loglog(np.sort(a["error"][k]), (np.arange(a["error"].shape[1]) + 0.5) / a["error"].shape[1], **style.look(name))
     errors.set(xlabel="relMSE of the mean of one run", ylabel="share of runs below", title="All runs")

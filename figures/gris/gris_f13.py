@@ -119,7 +119,7 @@ def draw(a: Arrays) -> "Picture":
         row[0].set_ylim(0, 2.5 * truth.max())
         row[1].set(xlabel="pixel of the inset", ylabel="relative squared error", title="Mean over frames, 9 pixels")
         for axis in row:
-            style.below(axis, bbox_to_anchor=(0.5, -0.24), columnspacing=1)
+            style.below(axis, ncols=3)
     return picture
 
 

@@ -166,7 +166,7 @@ def draw_borders(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
     axis.set_xticks(range(0, len(truth) + 1, 2 * TILE))
     axis.set(xlabel="pixel $x$ (ticks at every other border of tiles)", ylabel="rank correlation of errors\nof pixels $x - 1$ and $x$")
     axis.set(title="Next neighbours", ylim=(-0.25, 1.05))
-    style.below(axis, ncols=3, columnspacing=1)
+    style.below(axis, ncols=3)
 
 
 def draw_errors(axis: "Axes", images: dict[str, Array], truth: Array) -> None:

@@ -97,7 +97,7 @@ def draw(a: Arrays) -> "Picture":
     left.grid(visible=False, axis="y")
     left.set_xlim(min(0, reductions(a, "time").min() - 0.02), 1)
     left.set(xlabel="reduction of MAPE", title="ReSTIR PT against path tracing")
-    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4)
+    style.below(left, ncols=4)
     for name, dy, look in (
         ("rays", 0.1, style.look("path tracing", ls="", label="path tracing, equal rays")),
         ("restir", -0.1, style.look("ReSTIR PT", ls="")),
@@ -108,7 +108,7 @@ def draw(a: Arrays) -> "Picture":
     right.set_xscale("log")
     right.set_yticks(y, [f"{a['rays_ours'][k]:.0f} / {a['rays_tree'][k]:.1f}" for k in range(len(TEN))])
     right.set(xlabel="MAPE of the whole image (bars: 95%)", ylabel="rays: our frame / a tree", title="Errors")
-    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+    style.below(right, ncols=2)
     return picture
 
 

@@ -194,7 +194,7 @@ def draw(a: Arrays) -> "Picture":
         ylabel="fraction of configurations",
         title="Theorem A.4: only 1/M exceeds 1",
     )
-    weight.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
+    style.below(weight)
     return picture
 
 
@@ -214,7 +214,7 @@ def draw_bounds(axes: Any, t: Array) -> None:
         ylabel=r"excess of Var$[f(Y) W_Y]$ in $(C_f \|\hat p\|)^2$",
         title="Theorem 1: exact points lie below (negative ones not drawn)",
     )
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
+    style.below(axes)
 
 
 FIGURE = Figure(

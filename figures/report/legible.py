@@ -219,8 +219,10 @@ def colliding(picture: "Picture") -> Iterator[str]:
 
 
 def shown(panel: "Axes") -> list[tuple[str, tuple[str, str, str, str]]]:
-    """What a legend of the panel would show: labels with colour, marker, dash and hatch."""
-    return [(str(label), look(handle)) for handle, label in zip(*panel.get_legend_handles_labels(), strict=True)]
+    """What of a panel a legend of its picture names: labels with colour, marker, dash and hatch."""
+    named = {text.get_text() for legend in all_legends(panel.get_figure(root=True)) for text in legend.get_texts()}
+    pairs = zip(*panel.get_legend_handles_labels(), strict=True)
+    return [(str(label), look(handle)) for handle, label in pairs if label in named]
 
 
 def look(handle: Any) -> tuple[str, str, str, str]:
@@ -236,11 +238,20 @@ def look(handle: Any) -> tuple[str, str, str, str]:
         return to_hex(handle.get_color()), str(handle.get_marker()), dashes(handle), ""
     if isinstance(handle, Patch):
         colour = handle.get_facecolor() if handle.get_fill() else handle.get_edgecolor()
-        return to_hex(colour), "", dashes(handle), handle.get_hatch() or ""
+        return on_paper(colour), "", dashes(handle), handle.get_hatch() or ""
     if isinstance(handle, Collection):
         colours = [*handle.get_facecolor(), *handle.get_edgecolor()]
-        return to_hex(colours[0]), str(len(handle.get_paths()[0].vertices)), str(handle.get_linestyle()[0]), ""
+        shape = [str(len(path.vertices)) for path in handle.get_paths()[:1]]
+        return on_paper(colours[0]), "", str(handle.get_linestyle()[0]), "".join(shape)
     return "", "", "", ""
+
+
+def on_paper(colour: Any) -> str:
+    """A colour as it is seen on white paper."""
+    from matplotlib.colors import to_hex, to_rgba
+
+    *rgb, alpha = to_rgba(colour)
+    return to_hex([alpha * each + 1 - alpha for each in rgb])
 
 
 def dashes(handle: Any) -> str:
@@ -266,7 +277,7 @@ def contradictory(picture: "Picture") -> Iterator[str]:
 
 
 def alike(picture: "Picture") -> Iterator[str]:
-    """Lines of one panel that only their colour tells apart, or bars alike in hatching and lightness."""
+    """Lines of one panel that only their colour tells apart; bars and dots alike in hatching, shape and lightness."""
     for panel in axes(picture):
         for (one, a), (two, b) in combinations(dict(shown(panel)).items(), 2):
             is_bar = not a[1]

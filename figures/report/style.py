@@ -29,6 +29,8 @@ GREY, PALE, PAPER = "#888888", "#dddddd", "#ffffff"
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (3, 1)), (0, (7, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 HATCHES = ("", "//", "..", "xx", "\\\\", "++", "oo")
+LABELLED = 38.0
+"""Height of ticks and label under an axis, in points."""
 SPARSE = 0.08
 """Distance between markers of a line, in diagonals of its axes."""
 
@@ -202,6 +204,9 @@ def strips(axis: "Axes", rows: Sequence[Any], names: Sequence[str], high: float,
 
 
 def below(axis: "Axes", **changes: Any) -> None:
-    """A legend under the axis, where it hides nothing."""
-    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 2, "borderaxespad": 0.0}
-    axis.legend(**{**place, **changes})
+    """A legend under the axis and its label, where it hides nothing."""
+    from matplotlib.transforms import ScaledTranslation
+
+    under = axis.transAxes + ScaledTranslation(0, -LABELLED / 72, axis.get_figure(root=True).dpi_scale_trans)  # type: ignore[union-attr]
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": under}
+    axis.legend(**{**place, "ncols": 2, "columnspacing": 1.0, "borderaxespad": 0.0, **changes})

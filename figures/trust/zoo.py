@@ -244,7 +244,9 @@ def draw(a: Arrays) -> "Picture":
 def draw_matrix(axes: "Axes", value: Array, caught: Array) -> None:
     """Numbers in % where a check speaks, on ground that is darker than grey for too little, brighter for too much."""
     shown = np.where(caught, np.clip(value, -1, 1), np.nan)
-    axes.imshow(shown, cmap=style.IMAGE_MAP, vmin=-1, vmax=1, aspect="auto")
+    image = axes.imshow(shown, cmap=style.IMAGE_MAP, vmin=-1, vmax=1, aspect="auto")
+    scale = {"location": "bottom", "shrink": 0.5, "aspect": 50, "pad": 0.01, "extend": "both"}
+    axes.figure.colorbar(image, ax=axes, label="what a check finds, 1 = 100 %", **scale)
     for (row, column), number in np.ndenumerate(value):
         silent = not caught[row, column]
         colour = style.GREY if silent else "k" if number > 0.1 else "w"
