@@ -76,7 +76,7 @@ def _roughness(r: float) -> str:
 
 
 def lights(ax: "Axes", scene: Scene, most: int = 4) -> None:
-    """Lights as broad bars, each with a word on the side they shine to; more than `most` share one word behind them."""
+    """Lights as broad bars, each with a word on the side they shine to; more than `most` share one word."""
     from matplotlib.collections import LineCollection
 
     lamps = scene.lights
@@ -88,15 +88,15 @@ def lights(ax: "Axes", scene: Scene, most: int = 4) -> None:
         for k in range(len(ends)):
             _word(ax, "light", middle[:, k], n[:, k])
     else:
-        _word(ax, f"{len(ends)} lights", middle.mean(axis=1), -n.mean(axis=1))
+        _word(ax, f"{len(ends)} lights", middle.mean(axis=1), n.mean(axis=1), 10)
 
 
-def _word(ax: "Axes", text: str, at: Array, towards: Array) -> None:
-    """Text beside a point, in the given direction."""
+def _word(ax: "Axes", text: str, at: Array, towards: Array, away: float = 6) -> None:
+    """Text `away` points from a place, in the given direction."""
     x, y = np.round(towards).astype(int)
     ha, va = ("right", "center", "left")[x + 1], ("top", "center", "bottom")[y + 1]
     look = {"boxstyle": "square,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.75}
-    place: dict[str, Any] = {"xytext": (6 * x, 6 * y), "textcoords": "offset points", "ha": ha, "va": va}
+    place: dict[str, Any] = {"xytext": (away * x, away * y), "textcoords": "offset points", "ha": ha, "va": va}
     ax.annotate(text, tuple(at), **place, fontsize=8, bbox=look, zorder=6)
 
 
@@ -183,14 +183,14 @@ def bundle_picture(ax: "Axes", setting: Setting, t: Tracer, u: Array, pixel: Arr
 def fluence_picture(ax: "Axes", setting: Setting, values: Array, percentile: float = 99.0) -> "Colorbar":
     """A fluence map (rows, columns), row 0 at the bottom, with the scene on top; returns its logarithmic scale.
 
-    Fluence is radiance integrated over all directions of the plane: radiance x radians.  Nothing is drawn where it is 0,
-    as inside of what is solid.
+    Fluence is radiance integrated over all directions of the plane: radiance x radians.
+    What is darker or brighter than the scale has the tone of its end.
     """
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import NullLocator
 
     low, high = fluence_limits(values, percentile)
-    norm, values = LogNorm(low, high), np.ma.masked_less_equal(values, 0)
+    norm, values = LogNorm(low, high), np.maximum(values, low)
     (x, y), (X, Y) = setting.low, setting.high
     image = ax.imshow(values, cmap="cividis", norm=norm, origin="lower", extent=(x, X, y, Y), interpolation="nearest")
     for look in ({"color": "k", "lw": 2.0}, {"color": "w", "lw": 0.9}):

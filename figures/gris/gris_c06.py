@@ -200,7 +200,15 @@ def draw(a: Arrays) -> "Picture":
     drawn = a["counts"].mean(axis=0) / 64
     shares.stairs(BINS * a["single"], edges, color=style.VERMILLION, ls="--", lw=1.5, label="samples of single frames")
     shares.stairs(BINS * a["weighted"], edges, color=style.BLUE, lw=2, label="drawn from all frames")
-    shares.plot((edges[1:] + edges[:-1]) / 2, BINS * drawn, ".", color=style.INK, ms=4, markevery=1, label="one draw per pixel and run")
+    shares.plot(
+        (edges[1:] + edges[:-1]) / 2,
+        BINS * drawn,
+        ".",
+        color=style.INK,
+        ms=4,
+        markevery=1,
+        label="one draw per pixel and run",
+    )
     shares.set(
         xlabel="$F_i(Y)$, uniform for $Y \\sim f_i / ||f_i||$", ylabel="density", title="64-pixel image, $M_c = 20$"
     )

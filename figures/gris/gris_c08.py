@@ -99,7 +99,14 @@ def draw(a: Arrays) -> "Picture":
         label=r"target $\bar p$, all pixels",
     )
     toy.plot(x, line.pdf(np.full(500, 3), x), marker="", color=style.BLUE, ls="--", label="sampler of the centre")
-    toy.plot(x, line.pdf(np.full(500, 0), x), marker="", color=style.VERMILLION, ls=":", label="of the neighbours (share 10%)")
+    toy.plot(
+        x,
+        line.pdf(np.full(500, 0), x),
+        marker="",
+        color=style.VERMILLION,
+        ls=":",
+        label="of the neighbours (share 10%)",
+    )
     toy.set(xlabel="$x$ (unit interval)", ylabel="density (per unit length)", title="Neighbours that overstate")
     toy.set_ylim(0, 4)
     toy.legend(loc="upper left")

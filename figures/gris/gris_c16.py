@@ -71,7 +71,11 @@ def draw(a: Arrays) -> "Picture":
     _rows(axes[0, 1], a, "hybrid", f"ReSTIR PT, frame {realtime.FRAMES}")
     curves, distance = axes[0, 2], np.arange(1, REACH + 1)
     for name, label in NAMES.items():
-        curves.plot(distance, a[f"{name}.correlation"], **style.look(label.partition(",")[0], **LOOKS.get(name, {}), label=label))
+        curves.plot(
+            distance,
+            a[f"{name}.correlation"],
+            **style.look(label.partition(",")[0], **LOOKS.get(name, {}), label=label),
+        )
     for level, what, ls in ((0.3, "alike: above", (0, (1, 1))), (0.05, "independent: below", (0, (6, 1)))):
         curves.axhline(level, color=style.GREY, lw=1, ls=ls, marker="", label=f"{what} {level}")
     curves.set(

@@ -217,12 +217,18 @@ def draw(a: Arrays) -> "Picture":
     shares, sticky = axes[0]
     for k, x in enumerate(EXPONENTS):
         look = style.nth(k, markevery=1)
-        shares.loglog(a["M"], a["growing"][k, :, 0], **look | {"ls": "-"}, label=f"$|R| = M^{{{x:g}}}$")
-        shares.loglog(a["M"], a["growing"][k, :, 2], **look | {"ls": "--"}, mfc="none", label=f"$|R| = M^{{{x:g}}}$, bound")
+        bound = {**look, "ls": "--", "mfc": "none", "label": f"$|R| = M^{{{x:g}}}$, bound"}
+        shares.loglog(a["M"], a["growing"][k, :, 0], **{**look, "ls": "-"}, label=f"$|R| = M^{{{x:g}}}$")
+        shares.loglog(
+            a["M"], a["growing"][k, :, 2], **look | {"ls": "--"}, mfc="none", label=f"$|R| = M^{{{x:g}}}$, bound"
+        )
     for k, rho in enumerate(HOLD):
         look = style.nth(k, markevery=2)
-        sticky.loglog(a["M_sticky"], a["sticky"][k], **look | {"ls": "-"}, label=f"hold {rho:g}")
-        sticky.loglog(a["M_sticky"], a["sticky_bound"][k], **look | {"ls": "--"}, mfc="none", label=f"hold {rho:g}, bound")
+        bound = {**look, "ls": "--", "mfc": "none", "label": f"hold {rho:g}, bound"}
+        sticky.loglog(a["M_sticky"], a["sticky"][k], **{**look, "ls": "-"}, label=f"hold {rho:g}")
+        sticky.loglog(
+            a["M_sticky"], a["sticky_bound"][k], **look | {"ls": "--"}, mfc="none", label=f"hold {rho:g}, bound"
+        )
     shares.set(title="Seven domains, Talbot weights")
     sticky.set(title="Sticky chain of samples")
     for each in (shares, sticky):

@@ -147,7 +147,12 @@ def draw(a: Arrays) -> "Picture":
     over_T.set(xlabel="frames $T$", ylabel="mean square error", title="Lines exact, markers real code")
     style.below(over_T)
     for k, name in enumerate(("brightness", "chroma")):
-        over_cap.loglog(CAPS, a["exact"][1, 0, k] / a["capped"][:, k], **style.nth(4 + k, ls=("-", "--")[k], label=name), markevery=1)
+        over_cap.loglog(
+            CAPS,
+            a["exact"][1, 0, k] / a["capped"][:, k],
+            **style.nth(4 + k, ls=("-", "--")[k], label=name),
+            markevery=1,
+        )
     over_cap.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="as without reuse")
     over_cap.set(xlabel="cap $M_c$", ylabel="variance without / with reuse", title="Temporal reuse with a grey target")
     style.below(over_cap)

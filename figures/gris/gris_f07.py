@@ -145,7 +145,12 @@ def draw(a: Arrays) -> "Picture":
     for i in range(line.n):
         y = line.target(np.full(600, i), x)
         look = {"color": style.INK, "lw": 2.2, "ls": "-", "label": "centre", "zorder": 3}
-        other = {"color": style.GREY, "lw": 1, "ls": "--", "label": "others, cut off by their domains" if i == 0 else None}
+        other = {
+            "color": style.GREY,
+            "lw": 1,
+            "ls": "--",
+            "label": "others, cut off by their domains" if i == 0 else None,
+        }
         toy.plot(x, np.where(y > 0, y, np.nan), marker="", **(look if i == CENTRE else other))
     toy.set(
         xlabel="$x$ (length)",

@@ -135,7 +135,9 @@ def draw(a: Arrays) -> "Picture":
     line, x = degrading_neighbours(), np.linspace(0, 1, 800, endpoint=False)
     for j in range(0, 65, 4):
         look = CENTRAL if j == CENTRE else OTHER
-        toy.plot(x, line.f(np.full(800, j), x), marker="", label={CENTRE: "centre", 0: "every fourth other"}.get(j), **look)
+        toy.plot(
+            x, line.f(np.full(800, j), x), marker="", label={CENTRE: "centre", 0: "every fourth other"}.get(j), **look
+        )
     toy.set(xlabel="$x$ (unit interval)", ylabel="integrand (per unit length)", title="Of 65 pixels")
     toy.set_ylim(0, 1.25)
     M = 2 * np.array(RADII) + 1

@@ -81,7 +81,9 @@ def draw(a: Arrays) -> "Picture":
     curves.set(xlabel="pixel", ylabel="radiance", title="The same run, as curves")
     style.below(curves, ncols=3)
     for k, name in enumerate(NAMES):
-        errors.loglog(np.sort(a["error"][k]), (np.arange(a["error"].shape[1]) + 0.5) / a["error"].shape[1], **style.look(name))
+        errors.loglog(
+            np.sort(a["error"][k]), (np.arange(a["error"].shape[1]) + 0.5) / a["error"].shape[1], **style.look(name)
+        )
     errors.set(xlabel="relMSE of the mean of one run", ylabel="share of runs below", title="All runs")
     errors.set_yscale("linear")
     style.below(errors)

@@ -121,7 +121,9 @@ def draw(a: Arrays) -> "Picture":
         }
         for name, trees in prices.items():
             curve = [errors(a, scene, offline.traced(a, scene, trees(int(t)))).mean() for t in T]
-            axis.loglog(T, curve, **style.look("path tracing", **PRICES[name], label=f"path tracing, {name}"), markevery=1)
+            axis.loglog(
+                T, curve, **style.look("path tracing", **PRICES[name], label=f"path tracing, {name}"), markevery=1
+            )
         for method in METHODS[1:]:
             after = [errors(a, scene, offline.after(a, scene, method, int(t))).mean() for t in T]
             axis.loglog(T, after, **style.look(method), markevery=1)

@@ -163,7 +163,9 @@ def draw(a: Arrays) -> "Picture":
     for k, rule in enumerate(INTEGRALS):
         look = {"color": LOOKS[rule]["color"], "edgecolor": style.PAPER, "hatch": style.HATCHES[k]}
         right.bar(rule, a[f"{rule}.replayed"].mean(), **look)
-    right.set(xlabel="roughness by which vertices are judged", ylabel="vertices replayed per shift", title="Length of replay")
+    right.set(
+        xlabel="roughness by which vertices are judged", ylabel="vertices replayed per shift", title="Length of replay"
+    )
     right.grid(axis="x", visible=False)
     return picture
 

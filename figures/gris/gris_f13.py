@@ -112,7 +112,7 @@ def draw(a: Arrays) -> "Picture":
         for method in sorted(methods, reverse=True):
             images = a[f"{scene}.{method}"]
             look = style.look(method, label=f"{method}, equal rays" if method == PT else method)
-            row[0].plot(images[0], lw=0.9, **look)
+            row[0].plot(images[0], lw=0.9, markevery=8, **look)
             error = corners.relative(images, truth).mean(axis=0)
             row[1].semilogy(np.arange(4, 124), np.convolve(error, np.ones(9) / 9, mode="valid"), **look)
         row[0].set(xlabel="pixel of the inset", ylabel="radiance", title=f"{TITLES[scene]}: one frame")

@@ -157,14 +157,20 @@ def draw_images(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
     axis.set(xlabel="pixel (ticks at every other border of tiles)", title="One image each, at equal rays")
 
 
+CORRELATION = "rank correlation of errors\nof pixels $x - 1$ and $x$"
+
+
 def draw_borders(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
     """Rank correlation of the errors of pixels x - 1 and x."""
     for method, image in images.items():
         error = ranks(image - truth)
         pairs = [float(correlation(error[:, x - 1], error[:, x])) for x in range(1, len(truth))]
-        axis.plot(np.arange(1, len(truth)), pairs, **style.look(LABELS[method]))
+        axis.plot(np.arange(1, len(truth)), pairs, **style.look(LABELS[method]), markevery=8)
     axis.set_xticks(range(0, len(truth) + 1, 2 * TILE))
-    axis.set(xlabel="pixel $x$ (ticks at every other border of tiles)", ylabel="rank correlation of errors\nof pixels $x - 1$ and $x$")
+    axis.set(
+        xlabel="pixel $x$ (ticks at every other border of tiles)",
+        ylabel="rank correlation of errors\nof pixels $x - 1$ and $x$",
+    )
     axis.set(title="Next neighbours", ylim=(-0.25, 1.05))
     style.below(axis, ncols=3)
 

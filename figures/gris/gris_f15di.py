@@ -207,7 +207,9 @@ def draw_means(axis: "Axes", a: Arrays) -> None:
         axis.plot(mean, **look)
     axis.axhline(1, **style.look("truth"))
     edges = np.flatnonzero(a["edges"])
-    axis.plot(edges, np.full(len(edges), 0.5), color=style.INK, marker="|", ls="", markevery=1, label="edges of shadows")
+    axis.plot(
+        edges, np.full(len(edges), 0.5), color=style.INK, marker="|", ls="", markevery=1, label="edges of shadows"
+    )
     axis.set(
         xlabel="pixel", ylabel="mean / truth, ± 2 standard errors", title="Direct light by ReSTIR DI", ylim=(0.4, 1.45)
     )

@@ -186,7 +186,9 @@ def draw(a: Arrays) -> "Picture":
     draw_bounds(variance, t)
     for name, values in zip(WEIGHTS, a["weights"], strict=True):
         if name != "1/Z":
-            weight.plot(np.sort(values), np.linspace(0, 1, len(values)), **style.look(name, marker="", label=LABELS[name]))
+            weight.plot(
+                np.sort(values), np.linspace(0, 1, len(values)), **style.look(name, marker="", label=LABELS[name])
+            )
     weight.axvline(1, color=style.INK, lw=1, ls=(0, (1, 1)), marker="", label="at the bound")
     weight.set(
         xscale="log",
@@ -206,7 +208,9 @@ def draw_bounds(axes: Any, t: Array) -> None:
         (bounds.SHARPER, "--", r"$t\,(1 + t)$"),
     ):
         axes.loglog(x, bounds.excess_bound(1, x**2, 1, constant), ls=ls, color=style.INK, marker="", label=label)
-    axes.loglog(x, bounds.sharpest_excess_bound(1, x**2, 1), ls=":", color=style.INK, marker="", label="$t\\sqrt{1 + t^2}$")
+    axes.loglog(
+        x, bounds.sharpest_excess_bound(1, x**2, 1), ls=":", color=style.INK, marker="", label="$t\\sqrt{1 + t^2}$"
+    )
     axes.set(
         xlim=(0.008, 1.3 * t.max()),
         ylim=(1e-5, 1e4),

@@ -223,7 +223,7 @@ def draw(a: Arrays) -> "Picture":
     )
     _table(
         still,
-        "GRIS-F17x, GRIS-C20, indirect light: path tracing / offline frame; rays to equal MAPE, errors at equal rays",
+        "GRIS-F17x, GRIS-C20: path tracing / offline frame; rays to equal MAPE, errors at equal rays",
         [*(f"rays,\n{shift}" for shift in SHIFTS), "MAPE,\nhybrid", "relMSE,\nhybrid"],
         gris_f17.SIX,
         np.hstack([a["speedups"], a["ratios"]]),

@@ -7,7 +7,7 @@ where things are.
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain, combinations
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +36,7 @@ Looks = Mapping[str, Sequence[str]]
 
 def troubles(picture: "Picture") -> list[str]:
     """Everything that keeps the picture from being read."""
-    laws = (small, unlabelled, covered, colliding, alike, unexplained, scaleless, contradictory)
+    laws = (small, cut_off, unlabelled, covered, colliding, alike, unexplained, scaleless, contradictory)
     return [trouble for law in laws for trouble in law(picture)]
 
 
@@ -51,6 +51,15 @@ def small(picture: "Picture") -> Iterator[str]:
             yield f"{text.get_text()!r} is {size:.1f} px high, less than {LEAST:g}"
 
 
+def cut_off(picture: "Picture") -> Iterator[str]:
+    """Text that runs over the border of the picture."""
+    page = picture.bbox.padded(1)
+    for text in texts(picture):
+        box = text.get_window_extent()
+        if min(box.x0 - page.x0, box.y0 - page.y0, page.x1 - box.x1, page.y1 - box.y1) < 0:
+            yield f"{text.get_text()!r} is cut off at the border"
+
+
 def texts(picture: "Picture") -> "list[Text]":
     """All text that is drawn."""
     on_axes = [text for axis in axes(picture) for text in of_axes(axis)]
@@ -60,7 +69,7 @@ def texts(picture: "Picture") -> "list[Text]":
 
 def of_axes(axes: "Axes") -> "Iterator[Text]":
     """Title, words, labels and ticks of one panel, its tables included."""
-    yield from (axes.title, axes._left_title, axes._right_title)  # type: ignore[attr-defined]  # noqa: SLF001
+    yield from (axes.title, axes._left_title, axes._right_title)  # type: ignore[attr-defined]
     yield from axes.texts
     for table in axes.tables:
         yield from (cell.get_text() for cell in table.get_celld().values())
