@@ -226,9 +226,7 @@ def draw(a: Arrays) -> "Picture":
         look = style.nth(k, markevery=2)
         bound = {**look, "ls": "--", "mfc": "none", "label": f"hold {rho:g}, bound"}
         sticky.loglog(a["M_sticky"], a["sticky"][k], **{**look, "ls": "-"}, label=f"hold {rho:g}")
-        sticky.loglog(
-            a["M_sticky"], a["sticky_bound"][k], **look | {"ls": "--"}, mfc="none", label=f"hold {rho:g}, bound"
-        )
+        sticky.loglog(a["M_sticky"], a["sticky_bound"][k], **bound)
     shares.set(title="Seven domains, Talbot weights")
     sticky.set(title="Sticky chain of samples")
     for each in (shares, sticky):

@@ -209,9 +209,10 @@ def grid(box: "Bbox", n: int = 12) -> Any:
 
 def is_guide(artist: "Artist") -> bool:
     """Whether a line or bar spans its panel, as `axhline` and `axvspan` draw them."""
-    panel = artist.axes
-    across = (panel.get_xaxis_transform(), panel.get_yaxis_transform()) if panel else ()
-    return any(artist.get_transform().contains_branch(each) and each != panel.transData for each in across)
+    from matplotlib.patches import Patch
+
+    panel, own = artist.axes, artist.get_data_transform() if isinstance(artist, Patch) else artist.get_transform()
+    return panel is not None and own in (panel.get_xaxis_transform(), panel.get_yaxis_transform())
 
 
 def colliding(picture: "Picture") -> Iterator[str]:
@@ -306,8 +307,7 @@ def unexplained(picture: "Picture") -> Iterator[str]:
     named = {mine for panel in axes(picture) for _, mine in shown(panel)}
     for panel in (each for each in axes(picture) if each.axison):
         for line in panel.lines:
-            unnamed = str(line.get_label()).startswith("_")
-            if is_guide(line) and unnamed and look(line) not in named:
+            if is_guide(line) and look(line) not in named:
                 yield f"a line across {title(panel)} is not explained"
 
 

@@ -233,10 +233,10 @@ def draw(a: Arrays) -> "Picture":
     table.get_gridspec().set_width_ratios((2, 1))
     ranges.sharey(table)
     draw_matrix(table, a["value"], a["caught"])
-    draw_ranges(ranges, a["bias"], a["ranges"])
     for axes in (table, ranges):
         axes.axhline(len(BUGS) - 0.5, color=style.INK, lw=1, ls="-", marker="", label="above: bias; below: none")
         axes.tick_params(length=0)
+    draw_ranges(ranges, a["bias"], a["ranges"])
     table.set_ylim(len(BOTH) - 0.5, -0.5)
     return picture
 

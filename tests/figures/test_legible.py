@@ -17,7 +17,7 @@ X = np.arange(6.0)
 
 def good():
     """A picture that breaks no law."""
-    picture, axes = style.panels(1, 2)
+    picture, axes = style.panels(1, 2, width=3.2, height=2.4)
     for name in ("talbot", "pairwise"):
         axes[0, 0].plot(X, X + len(name), **style.look(name))
     axes[0, 0].axhline(3, **style.look("truth"))
