@@ -98,9 +98,9 @@ LOOKS = {"hybrid, frame 1": {"marker": "v", "ls": ":"}}
 
 def _rows(axis: "Axes", a: Arrays, name: str, title: str) -> None:
     """Six replicas below the reference."""
-    rows = np.stack([a["reference"], *a[f"{name}.images"]])
+    rows = [a["reference"], *a[f"{name}.images"]]
     names = ["reference", *(f"run {k}" for k in range(1, len(rows)))]
-    style.strips(axis, rows, names, 2 * a["reference"].max(), rows.shape[1])
+    style.strips(axis, rows, names, 2 * a["reference"].max(), len(rows[0]))
     axis.set(xlabel="pixel of the inset", title=title)
 
 

@@ -87,7 +87,8 @@ def axes(picture: "Picture") -> "list[Axes]":
     """All panels, those inside others included."""
     from matplotlib.axes import Axes
 
-    return [each for each in picture.findobj(Axes) if isinstance(each, Axes) and each.get_visible()]
+    found: list[Any] = picture.findobj(Axes)
+    return [each for each in found if each.get_visible()]
 
 
 def sides(axes: "Axes") -> "tuple[Axis, Axis]":
@@ -112,7 +113,7 @@ def unlabelled(picture: "Picture") -> Iterator[str]:
         for side in sides(panel) if panel.axison else ():
             numbers = [text.get_text() for text in ticks(side) if numeric(text.get_text())]
             if numbers and not side.label.get_text().strip() and not borrowed(panel, side):
-                yield f"axis {side.axis_name} of {title(panel)} has ticks {', '.join(numbers[:3])} and no label"
+                yield f"axis {named(side)} of {title(panel)} has ticks {', '.join(numbers[:3])} and no label"
 
 
 def numeric(text: str) -> bool:
@@ -122,16 +123,20 @@ def numeric(text: str) -> bool:
     )
 
 
+def named(side: "Axis") -> str:
+    """The letter of an axis."""
+    return "x" if side is side.axes.xaxis else "y"
+
+
 def borrowed(panel: "Axes", side: "Axis") -> bool:
     """Whether a panel of the same row or column has the words, as a grid of panels has them at its border."""
     mine = panel.get_subplotspec()
     for other in panel.figure.axes if mine else ():
         theirs = other.get_subplotspec()
-        if theirs is None or theirs.get_gridspec() is not mine.get_gridspec():
+        if mine is None or theirs is None or theirs.get_gridspec() is not mine.get_gridspec():
             continue
-        row, column = theirs.rowspan == mine.rowspan, theirs.colspan == mine.colspan
-        fits = column if side.axis_name == "x" else row
-        if fits and (other.xaxis if side.axis_name == "x" else other.yaxis).label.get_text().strip():
+        fits = theirs.colspan == mine.colspan if named(side) == "x" else theirs.rowspan == mine.rowspan
+        if fits and (other.xaxis if named(side) == "x" else other.yaxis).label.get_text().strip():
             return True
     return False
 
@@ -181,7 +186,7 @@ def marks(panel: "Axes") -> Iterator[Any]:
         if not is_guide(patch) and isinstance(patch, Rectangle):
             yield within(panel, grid(patch.get_window_extent()))
     for each in panel.collections:
-        offsets = each.get_offsets()
+        offsets = np.asarray(each.get_offsets())
         if len(offsets) > 1:
             yield within(panel, each.get_offset_transform().transform(offsets))
 
@@ -230,7 +235,8 @@ def colliding(picture: "Picture") -> Iterator[str]:
 
 def shown(panel: "Axes") -> list[tuple[str, tuple[str, str, str, str]]]:
     """What of a panel a legend of its picture names: labels with colour, marker, dash and hatch."""
-    named = {text.get_text() for legend in all_legends(panel.get_figure(root=True)) for text in legend.get_texts()}
+    picture: Any = panel.get_figure(root=True)
+    named = {text.get_text() for legend in all_legends(picture) for text in legend.get_texts()}
     pairs = zip(*panel.get_legend_handles_labels(), strict=True)
     return [(str(label), look(handle)) for handle, label in pairs if label in named]
 
@@ -251,7 +257,7 @@ def look(handle: Any) -> tuple[str, str, str, str]:
         return on_paper(colour), "", dashes(handle), handle.get_hatch() or ""
     if isinstance(handle, Collection):
         colours = [*handle.get_facecolor(), *handle.get_edgecolor()]
-        shape = [str(len(path.vertices)) for path in handle.get_paths()[:1]]
+        shape = [str(len(np.asarray(path.vertices))) for path in handle.get_paths()[:1]]
         return on_paper(colours[0]), "", str(handle.get_linestyle()[0]), "".join(shape)
     return "", "", "", ""
 
@@ -260,8 +266,9 @@ def on_paper(colour: Any) -> str:
     """A colour as it is seen on white paper."""
     from matplotlib.colors import to_hex, to_rgba
 
-    *rgb, alpha = to_rgba(colour)
-    return to_hex([alpha * each + 1 - alpha for each in rgb])
+    red, green, blue, alpha = to_rgba(colour)
+    white = 1 - alpha
+    return to_hex((alpha * red + white, alpha * green + white, alpha * blue + white))
 
 
 def dashes(handle: Any) -> str:

@@ -245,7 +245,7 @@ def draw_matrix(axes: "Axes", value: Array, caught: Array) -> None:
     """Numbers in % where a check speaks, on ground that is darker than grey for too little, brighter for too much."""
     shown = np.where(caught, np.clip(value, -1, 1), np.nan)
     image = axes.imshow(shown, cmap=style.IMAGE_MAP, vmin=-1, vmax=1, aspect="auto")
-    scale = {"location": "bottom", "shrink": 0.5, "aspect": 50, "pad": 0.01, "extend": "both"}
+    scale: dict[str, Any] = {"location": "bottom", "shrink": 0.5, "aspect": 50, "pad": 0.01, "extend": "both"}
     axes.figure.colorbar(image, ax=axes, label="what a check finds, 1 = 100 %", **scale)
     for (row, column), number in np.ndenumerate(value):
         silent = not caught[row, column]
@@ -281,7 +281,7 @@ def draw_ranges(axes: "Axes", bias: Array, ranges: Array) -> None:
     axes.axvline(0, color=style.INK, lw=0.8, ls=":", marker="", label="no bias")
     axes.set(xlim=(LEFT, RIGHT), xlabel="relative bias of cells (1 = 100 %)")
     axes.set_title("Range of the exact bias\nright: random scenes in which it shows")
-    axes.legend(loc="lower right", bbox_to_anchor=(1, 0.005))
+    style.below(axes, ncols=1)
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", labelleft=False)
 
