@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from restir_ref.batch import Array, map_leaves, take, total
+from restir_ref.batch import Array, take, total
 from restir_ref.transport.materials import Vertex, lobe_shares
 from restir_ref.transport.paths import Path, Suffix, Tracer, leaves, light_leaf, trace
 from restir_ref.transport.rays import light_pdf, vertex
-from restir_ref.transport.shifts import Prefix, end, reconnect, replay
+from restir_ref.transport.shifts import RECONNECTS, Arrival, finish, reconnect, replay
 from restir_ref.transport.vectors import normalize
 
 
@@ -65,20 +65,20 @@ def _goes_on(x: Path | Compact, i: Array) -> Array:
 def unpack(t: Tracer, x: Compact, pixel: Array) -> Path:
     """The path record again, by tracing the path in its own `pixel` (N,); numbers that nothing reads are 1/2."""
     known = _untraced(t, x)
-    prefix = replay(t, known, pixel, np.where(known.c > 0, known.c - 1, known.k))
-    groups = [np.flatnonzero(known.c == c) for c in range(t.depth + 2)]
-    parts = [_traced(t, take(known, columns), take(prefix, columns)) for columns in groups if len(columns)]
-    order = np.argsort(np.concatenate(groups))
-    whole: Path = map_leaves(lambda *leaves: np.concatenate(leaves, axis=-1).take(order, axis=-1), *parts)
-    return whole
+    S, p_light, A, F, out = known.S.copy(), known.p_light.copy(), known.A.copy(), 0 * known.F, known.out.copy()
+    for at in replay(t, known, pixel):
+        y = _traced(t, at)
+        S[:, at.columns], p_light[at.columns], out[:, at.columns] = y.S, y.p_light, y.out
+        F[:, at.columns], A[at.columns] = y.F, y.A
+    return replace(known, S=S, p_light=p_light, out=out, F=F, A=A)
 
 
-def _traced(t: Tracer, x: Path, y: Prefix) -> Path:
-    """S and p_light from x_c on, F and A from the pixel on; all columns reconnect at one index."""
-    c = int(x.c[0])
-    if c == 0:
-        return replace(x, F=end(t, x, y)[0])
-    whole = _by_light(t, _by_hit(t, x, c), vertex(t.scene, x.z, x.prim, normalize(y.v.x - x.z)))
+def _traced(t: Tracer, at: Arrival) -> Path:
+    """S and p_light from x_c on, F and A from the pixel on."""
+    if at.follows != RECONNECTS:
+        return replace(at.x, F=finish(t, at)[0])
+    x, y = at.x, at.y
+    whole = _by_light(t, _by_hit(t, x, at.s + 1), vertex(t.scene, x.z, x.prim, normalize(y.v.x - x.z)))
     F, A, _ = reconnect(t, whole, y)
     return replace(whole, F=F, A=A)
 

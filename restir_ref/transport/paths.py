@@ -14,7 +14,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio
+from restir_ref.batch import Array, Block, ratio
 from restir_ref.guards import whole
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
@@ -122,7 +122,7 @@ class Suffix(Tracer):
 
 
 @dataclass(frozen=True)
-class Path:
+class Path(Block):
     """A path, evaluated, with what its shift needs.  [GRIS 8.2]
 
     u (D, N)  primary sample; stale from the reconnection on

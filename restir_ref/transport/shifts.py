@@ -5,11 +5,13 @@ differs.  In primary sample space the Jacobian is J = A(y) / A(x) with one numbe
 density with which primary samples produce the reconnection vertex and the direction leaving it.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from restir_ref.batch import Array, pick, ratio, take, total, where
+from restir_ref.batch import Array, Batch, changed, gathered, part, pick, ratio, take, total
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import (
@@ -24,68 +26,91 @@ from restir_ref.transport.paths import (
 from restir_ref.transport.rays import GRAZING, arrive, emitted, light_pdf, vertex
 from restir_ref.transport.vectors import norm
 
+BY_HIT, BY_LIGHT, RECONNECTS = range(3)
+"""What follows the free part of a path: a BSDF sample that meets a light, light sampling, or the reconnection."""
+
 
 @dataclass(frozen=True)
 class Prefix:
-    """A replayed path up to its last free vertex y_s: the vertex, throughput T (C, N), and whether it is legal."""
+    """A replayed path up to a free vertex y_i: the vertex, and the throughput T (C, N) that arrives there."""
 
     v: Vertex
     T: Array
-    legal: Array
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Columns (n,) of a shift that have come to their last free vertex y_s, and what follows it, the same in all."""
+
+    columns: Array
+    x: Path
+    y: Prefix
+    s: int
+    follows: int
 
 
 def shift_path(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
     """The offset path in `pixel` (N,) of tracer t, and J (N,), 0 where undefined."""
+    F, A, J = np.zeros((t.scene.C, len(pixel))), np.ones(len(pixel)), np.zeros(len(pixel))
+    for at in replay(t, x, pixel):
+        F_y, A_y, legal = finish(t, at)
+        J_y = np.where(legal, ratio(A_y, at.x.A), 0.0)
+        F[:, at.columns] = np.where(J_y > 0, F_y, 0.0)
+        A[at.columns] = np.where(J_y > 0, A_y, 1.0)
+        J[at.columns] = J_y
+    return changed(x, F=F, A=A), J
+
+
+def replay(t: Tracer, x: Path, pixel: Array) -> Iterator[Arrival]:
+    """Trace y_1, y_2 .. with x's numbers, all paths together, until the free part of each ends.
+
+    Columns are sorted once by where it ends and what follows, so that those that arrive together lie side by
+    side.  Paths that get lost, or on which a pair connects before x's does, do not arrive.
+    """
     s = np.where(x.c > 0, x.c - 1, x.k)
-    prefix = replay(t, x, pixel, s)
-    replayed, reconnected = x.c == 0, x.c > 0
-    F, A = np.zeros_like(x.F), np.ones_like(x.A)
-    legal = prefix.legal
-    for columns, finish in ((np.flatnonzero(reconnected & legal), reconnect), (np.flatnonzero(replayed & legal), end)):
-        if len(columns):
-            F_part, A_part, legal_part = finish(t, take(x, columns), take(prefix, columns))
-            F[:, columns], A[columns], legal[columns] = F_part, A_part, legal_part
-    J = np.where(legal, ratio(A, x.A), 0.0)
-    return replace(x, F=np.where(J > 0, F, 0.0), A=np.where(J > 0, A, 1.0)), J
-
-
-def replay(t: Tracer, x: Path, pixel: Array, s: Array) -> Prefix:
-    """Trace y_1 .. y_s with x's numbers; illegal where a pair connects before x's does."""
+    order = 3 * s + np.where(x.c > 0, RECONNECTS, x.nee)
+    columns = np.argsort(order.astype(np.min_scalar_type(3 * t.depth + 2)), kind="stable")
+    x, order, pixel = gathered(take(x, columns)), order.take(columns), pixel.take(columns)
     v, _, T = first_hit(t, x.u, pixel)
-    prefix = Prefix(v, T, T.any(axis=0) | (s == 0))
-    for i in range(1, int(s.max(initial=0))):
-        columns = np.flatnonzero((s > i) & prefix.legal)
-        if not len(columns):
-            break
-        part = _step(t, take(x, columns), take(prefix, columns), i, take(s, columns))
-        prefix = _put(prefix, columns, part)
-    return prefix
+    y, on = Prefix(v, T), T.any(axis=0) | (order < 3)
+    for i in range(int(s.max(initial=-1)) + 1):
+        if i > 1:
+            columns, x, order, y = take((columns, x, order, y), np.flatnonzero(on))
+            y, on = _step(t, x, y, i - 1)
+        ends = np.searchsorted(order, 3 * i + np.arange(4))
+        for follows, (start, stop) in enumerate(pairwise(ends)):
+            here = start + np.flatnonzero(on[start:stop])
+            if len(here):
+                yield Arrival(columns[here], *_few((x, y), here), i, follows)
+        on[: ends[-1]] = False
 
 
-def _step(t: Tracer, x: Path, y: Prefix, i: int, s: Array) -> Prefix:
-    """From y_i to y_(i+1), and the test that they must not connect."""
+def _few(batch: Batch, columns: Array) -> Batch:
+    """Rising columns of a batch; those without a gap are not copied."""
+    start, stop = int(columns[0]), int(columns[-1]) + 1
+    return part(batch, slice(start, stop)) if stop - start == len(columns) else take(batch, columns)
+
+
+def _step(t: Tracer, x: Path, y: Prefix, i: int) -> tuple[Prefix, Array]:
+    """From y_i to y_(i+1), and whether it is there; not where the two must not be connected."""
     table = t.scene.materials
     at = scatter(t, y.v, x.u, i)
     v, r, met = arrive(t.scene, y.v.x, at.w)
     P = mat.lobe_shares(table, v)
-    lobe = np.where((i + 1 == s) & (x.c > 0), x.lobe_in, mat.choose_lobe(P, t.lobe_number(x.u, i + 1)))
-    light_end = (i + 1 == s) & (x.c == 0) & x.nee
+    lobe = np.where(x.c == i + 2, x.lobe_in, mat.choose_lobe(P, t.lobe_number(x.u, i + 1)))
+    light_end = (x.c == 0) & x.nee & (x.k == i + 1)
     rough = np.where(light_end, mat.roughest(table, v), mat.lobe_roughness(table, v, lobe))
     early = connectable(t.rule, mat.lobe_roughness(table, y.v, at.lobe), rough, r)
     T = y.T * at.weight
-    return Prefix(v, T, met & ~early & T.any(axis=0))
+    return Prefix(v, T), met & ~early & T.any(axis=0)
 
 
-def end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
-    """The last steps of pure replay: F, A = 1, and whether the end is legal."""
-    F, legal = np.zeros_like(x.F), y.legal.copy()
-    for k in np.unique(x.k):
-        for nee in (False, True):
-            columns = np.flatnonzero((x.k == k) & (x.nee == nee))
-            if len(columns):
-                finish = _light_end if nee else _hit_end
-                F[:, columns], legal[columns] = finish(t, take(x, columns), take(y, columns), int(k))
-    return F, np.ones_like(x.A), legal
+def finish(t: Tracer, at: Arrival) -> tuple[Array, Array, Array]:
+    """What follows y_s: F (C, n), A (n,), which is 1 where nothing reconnects, and whether it is legal."""
+    if at.follows == RECONNECTS:
+        return reconnect(t, at.x, at.y)
+    F, legal = (_light_end if at.follows == BY_LIGHT else _hit_end)(t, at.x, at.y, at.s)
+    return F, np.ones(len(at.columns)), legal
 
 
 def _light_end(t: Tracer, x: Path, y: Prefix, k: int) -> tuple[Array, Array]:
@@ -149,12 +174,3 @@ def _beyond(t: Tracer, x: Path, z: Vertex, p_all_y: Array, r: Array) -> tuple[Ar
     at_light, at_last = x.c > x.k, x.nee & (x.c == x.k)
     p_out = np.where(at_light | at_last, 1.0, p)
     return p_out, np.where(at_light, seen, np.where(at_last, lit, through))
-
-
-def _put(whole: Prefix, columns: Array, part: Prefix) -> Prefix:
-    """`whole` with `part` in the given columns."""
-    position = np.zeros(len(whole.legal), dtype=int)
-    position[columns] = np.arange(len(columns))
-    mask = np.zeros(len(whole.legal), dtype=bool)
-    mask[columns] = True
-    return where(mask, take(part, position), whole)
