@@ -176,6 +176,16 @@ def where(mask: Array, a: Batch, b: Batch) -> Batch:
     return merged
 
 
+def put(batch: Batch, columns: Array, values: Batch) -> None:
+    """Write values into columns (n,) of a batch whose memory is the caller's own."""
+
+    def write(leaf: Array, anew: Array) -> Array:
+        leaf[..., columns] = anew
+        return leaf
+
+    map_leaves(write, batch, values)
+
+
 def pick(batches: Sequence[Batch], s: Array) -> Batch:
     """Column n of batches[s[n]], gathered; s (N,) integers below len(batches)."""
     chosen = [s == k for k in range(1, len(batches))]

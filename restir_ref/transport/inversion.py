@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from restir_ref.batch import Array, take, where
+from restir_ref.batch import Array, take
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
-from restir_ref.transport.paths import REPLAY, Path, Tracer, first_hit, leaves, trace
+from restir_ref.transport.paths import REPLAY, Path, Tracer, leaves, trace
 from restir_ref.transport.rays import vertex
 from restir_ref.transport.record import record
 from restir_ref.transport.shifts import replay
@@ -40,21 +40,11 @@ class Connection:
 
 def connection(t: Tracer, x: Path, pixel: Array) -> Connection:
     """Where the path of `pixel` (N,) leaves its free prefix; all columns must reconnect."""
-    v = last_free(t, x, pixel)
+    v = replay(replace(t, rule=REPLAY), x, pixel).v  # as it is, whether or not it could have connected before
     w = normalize(x.z - v.x)
     z = vertex(t.scene, x.z, x.prim, -w)
     table = t.scene.materials
     return Connection(v, z, mat.lobe_shares(table, v), mat.lobe_shares(table, z), w)
-
-
-def last_free(t: Tracer, x: Path, pixel: Array) -> Vertex:
-    """x_s as the path has it in `pixel` (N,), whether or not it could have connected before; x_1 where it is lost."""
-    v, _, _ = first_hit(t, x.u, pixel)
-    for at in replay(replace(t, rule=REPLAY), x, pixel):
-        place = np.full(len(pixel), -1)
-        place[at.columns] = np.arange(len(at.columns))
-        v = where(place >= 0, take(at.y.v, np.maximum(place, 0)), v)
-    return v
 
 
 def primary_sample(tx: Tracer, x: Path, pixel_x: Array, ty: Tracer, y: Path, pixel_y: Array) -> Array:

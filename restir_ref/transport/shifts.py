@@ -5,13 +5,12 @@ differs.  In primary sample space the Jacobian is J = A(y) / A(x) with one numbe
 density with which primary samples produce the reconnection vertex and the direction leaving it.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from restir_ref.batch import Array, Batch, changed, gathered, part, pick, ratio, take, total
+from restir_ref.batch import Array, changed, gathered, part, pick, put, ratio, take, total
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import (
@@ -26,107 +25,87 @@ from restir_ref.transport.paths import (
 from restir_ref.transport.rays import GRAZING, arrive, emitted, light_pdf, vertex
 from restir_ref.transport.vectors import norm
 
-BY_HIT, BY_LIGHT, RECONNECTS = range(3)
-"""What follows the free part of a path: a BSDF sample that meets a light, light sampling, or the reconnection."""
-
 
 @dataclass(frozen=True)
 class Prefix:
-    """A replayed path up to a free vertex y_i: the vertex, and the throughput T (C, N) that arrives there."""
+    """A replayed path up to its last free vertex y_s, which is on the light if a BSDF sample finds it.
+
+    v, r (N,), p_all (N,)  y_s, its distance from y_(s-1), and the density of that direction over all lobes
+    T (C, N), legal (N,)   the throughput that arrives there, and whether the path may
+    """
 
     v: Vertex
+    r: Array
+    p_all: Array
     T: Array
-
-
-@dataclass(frozen=True)
-class Arrival:
-    """Columns (n,) of a shift that have come to their last free vertex y_s, and what follows it, the same in all."""
-
-    columns: Array
-    x: Path
-    y: Prefix
-    s: int
-    follows: int
+    legal: Array
 
 
 def shift_path(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
-    """The offset path in `pixel` (N,) of tracer t, and J (N,), 0 where undefined."""
-    F, A, J = np.zeros((t.scene.C, len(pixel))), np.ones(len(pixel)), np.zeros(len(pixel))
-    for at in replay(t, x, pixel):
-        F_y, A_y, legal = finish(t, at)
-        J_y = np.where(legal, ratio(A_y, at.x.A), 0.0)
-        F[:, at.columns] = np.where(J_y > 0, F_y, 0.0)
-        A[at.columns] = np.where(J_y > 0, A_y, 1.0)
-        J[at.columns] = J_y
+    """The offset path in `pixel` (N,) of tracer t, and J (N,), 0 where undefined.
+
+    Columns are sorted once by what follows their free part, and what follows is computed for slices.
+    """
+    replayed = x.c == 0
+    kinds = [np.flatnonzero(kind) for kind in (replayed & ~x.nee, replayed & x.nee, ~replayed)]
+    order, ends = np.concatenate(kinds), np.cumsum([0, *map(len, kinds)])
+    base = gathered(take(x, order))
+    prefix = replay(t, base, pixel.take(order))
+    F, A, J = np.zeros((t.scene.C, len(order))), np.ones(len(order)), np.zeros(len(order))
+    for finish, (start, stop) in zip((_hit_end, _light_end, reconnect), pairwise(ends), strict=True):
+        if start < stop:
+            here = slice(start, stop)
+            F_y, A_y, legal = finish(t, *part((base, prefix), here))
+            J_y = np.where(legal, ratio(A_y, base.A[here]), 0.0)
+            columns = order[here]
+            F[:, columns], A[columns], J[columns] = np.where(J_y > 0, F_y, 0.0), np.where(J_y > 0, A_y, 1.0), J_y
     return changed(x, F=F, A=A), J
 
 
-def replay(t: Tracer, x: Path, pixel: Array) -> Iterator[Arrival]:
-    """Trace y_1, y_2 .. with x's numbers, all paths together, until the free part of each ends.
-
-    Columns are sorted once by where it ends and what follows, so that those that arrive together lie side by
-    side.  Paths that get lost, or on which a pair connects before x's does, do not arrive.
-    """
-    s = np.where(x.c > 0, x.c - 1, x.k)
-    order = 3 * s + np.where(x.c > 0, RECONNECTS, x.nee)
-    columns = np.argsort(order.astype(np.min_scalar_type(3 * t.depth + 2)), kind="stable")
-    x, order, pixel = gathered(take(x, columns)), order.take(columns), pixel.take(columns)
-    v, _, T = first_hit(t, x.u, pixel)
-    y, on = Prefix(v, T), T.any(axis=0) | (order < 3)
-    for i in range(int(s.max(initial=-1)) + 1):
-        if i > 1:
-            columns, x, order, y = take((columns, x, order, y), np.flatnonzero(on))
-            y, on = _step(t, x, y, i - 1)
-        ends = np.searchsorted(order, 3 * i + np.arange(4))
-        for follows, (start, stop) in enumerate(pairwise(ends)):
-            here = start + np.flatnonzero(on[start:stop])
-            if len(here):
-                yield Arrival(columns[here], *_few((x, y), here), i, follows)
-        on[: ends[-1]] = False
+def replay(t: Tracer, x: Path, pixel: Array) -> Prefix:
+    """Trace y_1 .. y_s with x's numbers; illegal where a pair connects before x's does."""
+    s = np.where(x.c > 0, x.c - 1, np.where(x.nee, x.k, x.k + 1))
+    v, r, T = first_hit(t, x.u, pixel)
+    y = Prefix(v, r, np.zeros(len(s)), np.array(T), T.any(axis=0) | (x.k == 0))
+    for i in range(1, int(s.max(initial=0))):
+        columns = np.flatnonzero((s > i) & y.legal)
+        if not len(columns):
+            break
+        put(y, columns, _step(t, *take((x, y), columns), i))
+    return y
 
 
-def _few(batch: Batch, columns: Array) -> Batch:
-    """Rising columns of a batch; those without a gap are not copied."""
-    start, stop = int(columns[0]), int(columns[-1]) + 1
-    return part(batch, slice(start, stop)) if stop - start == len(columns) else take(batch, columns)
-
-
-def _step(t: Tracer, x: Path, y: Prefix, i: int) -> tuple[Prefix, Array]:
-    """From y_i to y_(i+1), and whether it is there; not where the two must not be connected."""
-    table = t.scene.materials
+def _step(t: Tracer, x: Path, y: Prefix, i: int) -> Prefix:
+    """From y_i to y_(i+1), and the test that they must not connect."""
     at = scatter(t, y.v, x.u, i)
     v, r, met = arrive(t.scene, y.v.x, at.w)
-    P = mat.lobe_shares(table, v)
-    lobe = np.where(x.c == i + 2, x.lobe_in, mat.choose_lobe(P, t.lobe_number(x.u, i + 1)))
-    light_end = (x.c == 0) & x.nee & (x.k == i + 1)
-    rough = np.where(light_end, mat.roughest(table, v), mat.lobe_roughness(table, v, lobe))
-    early = connectable(t.rule, mat.lobe_roughness(table, y.v, at.lobe), rough, r)
+    by_hit = (x.c == 0) & ~x.nee & (x.k == i)
+    far = np.where(by_hit, 1.0, _roughness_of_y(t, x, v, i + 1)) if i < t.depth else np.ones(len(r))
+    early = connectable(t.rule, mat.lobe_roughness(t.scene.materials, y.v, at.lobe), far, r)
     T = y.T * at.weight
-    return Prefix(v, T), met & ~early & T.any(axis=0)
+    return Prefix(v, r, at.p_all, T, met & ~early & (T.any(axis=0) | by_hit))
 
 
-def finish(t: Tracer, at: Arrival) -> tuple[Array, Array, Array]:
-    """What follows y_s: F (C, n), A (n,), which is 1 where nothing reconnects, and whether it is legal."""
-    if at.follows == RECONNECTS:
-        return reconnect(t, at.x, at.y)
-    F, legal = (_light_end if at.follows == BY_LIGHT else _hit_end)(t, at.x, at.y, at.s)
-    return F, np.ones(len(at.columns)), legal
+def _roughness_of_y(t: Tracer, x: Path, v: Vertex, i: int) -> Array:
+    """Roughness that judges y_i: of the lobe that will leave it, its roughest before light sampling."""
+    table = t.scene.materials
+    lobe = np.where(x.c == i + 1, x.lobe_in, mat.choose_lobe(mat.lobe_shares(table, v), t.lobe_number(x.u, i)))
+    by_light = (x.c == 0) & x.nee & (x.k == i)
+    return np.where(by_light, mat.roughest(table, v), mat.lobe_roughness(table, v, lobe))
 
 
-def _light_end(t: Tracer, x: Path, y: Prefix, k: int) -> tuple[Array, Array]:
-    leaf, _ = light_leaf(t, y.v, mat.lobe_shares(t.scene.materials, y.v), x.u, k)
-    return y.T * leaf.end, np.ones(len(x.k), dtype=bool)
+def _hit_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
+    """A BSDF sample has met the light: F, A = 1, and whether it is legal."""
+    return y.T * hit_leaf(t, y.v, y.r, y.p_all).end, np.ones_like(y.r), y.legal
 
 
-def _hit_end(t: Tracer, x: Path, y: Prefix, k: int) -> tuple[Array, Array]:
-    """A BSDF sample from y_k onto a light, which must not be connectable."""
-    if k == 0:
-        return y.T * emitted(t.scene, y.v), np.ones(len(x.k), dtype=bool)
-    at = scatter(t, y.v, x.u, k)
-    v, r, met = arrive(t.scene, y.v.x, at.w)
-    rough = mat.lobe_roughness(t.scene.materials, y.v, at.lobe)
-    early = connectable(t.rule, rough, np.ones(len(x.k)), r)
-    return y.T * at.weight * hit_leaf(t, v, r, at).end, met & ~early
+def _light_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
+    """Light sampling from y_k: F, A = 1, and whether it is legal."""
+    F, legal = np.zeros_like(y.T), np.flatnonzero(y.legal)
+    at, k, u = take((y, x.k, x.u), legal)
+    leaf, _ = light_leaf(t, at.v, mat.lobe_shares(t.scene.materials, at.v), t.light_numbers(u, k))
+    F[:, legal] = at.T * leaf.end
+    return F, np.ones_like(y.r), y.legal
 
 
 def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
@@ -140,7 +119,7 @@ def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     local = space.to_local(y.v.n, w)
     weight, p, p_all = mat.scatter_lobe(table, space, y.v, P, x.lobe_in, local)
     far = _roughness_of_z(t, x, z)
-    legal = connectable(t.rule, mat.lobe_roughness(table, y.v, x.lobe_in), far, r) & (p > 0)
+    legal = y.legal & connectable(t.rule, mat.lobe_roughness(table, y.v, x.lobe_in), far, r) & (p > 0)
     p_out, E = _beyond(t, x, z, p_all, r)
     A = p * z.o[-1] / r ** (space.d - 1) * p_out
     legal &= (A > 0) & (np.minimum(np.abs(local[-1]), z.o[-1]) > GRAZING)

@@ -5,12 +5,12 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio
+from restir_ref.batch import Array, ratio, take
 from restir_ref.integrals import Pixels, Shifted
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Path, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Scene
-from restir_ref.transport.shifts import RECONNECTS, reconnect, replay, shift_path
+from restir_ref.transport.shifts import reconnect, replay, shift_path
 
 LARGEST_JACOBIAN = 1.5
 """Where the one-way rejection draws its line."""
@@ -67,11 +67,12 @@ class Loosened(PathIntegrals):
         y, J = shift_path(self.before(t), x, pixel)  # right for paths that never reconnect
         F, A, J = y.F.copy(), y.A.copy(), np.where(x.c > 0, 0, J)
         F[:, x.c > 0], A[x.c > 0] = 0, 1
-        for at in replay(self.before(t), x, pixel):
-            if at.follows == RECONNECTS:
-                found, density, legal = reconnect(self.at(t), at.x, at.y)
-                J[at.columns] = np.where(legal, ratio(density, at.x.A), 0)
-                F[:, at.columns], A[at.columns] = found * legal, np.where(legal, density, 1)
+        columns = np.flatnonzero(x.c > 0)
+        if len(columns):
+            part = take(x, columns)
+            found, density, legal = reconnect(self.at(t), part, replay(self.before(t), part, pixel[columns]))
+            J[columns] = np.where(legal, ratio(density, part.A), 0)
+            F[:, columns], A[columns] = found * legal, np.where(legal, density, 1)
         return Shifted(replace(y, F=F, A=A), J)
 
 
