@@ -104,14 +104,17 @@ def part(batch: Batch, columns: slice) -> Batch:
 
 
 def in_memory(f: Callable[[Array], Array], batch: Batch) -> Batch:
-    """Apply f to what there is of a batch: to its leaves, or to a reference's index and own fields."""
+    """Apply f to what there is of a batch: to its leaves, or to a reference's index and to fields that were read."""
 
     def refer(x: Block) -> Block:
         if not is_reference(x):
             whole: Block = map_leaves(f, x)
             return whole
         of, index, own = reference(x)
-        return referring(of, f(index), {name: in_memory(f, field) for name, field in own.items()})
+        mapped = referring(of, f(index), {name: in_memory(f, field) for name, field in own.items()})
+        read = x.__dict__.keys() & names(type(x)) - own.keys()
+        mapped.__dict__.update({name: in_memory(f, x.__dict__[name]) for name in read})
+        return mapped
 
     mapped: Batch = map_leaves(f, batch, refer=refer)
     return mapped
@@ -134,6 +137,15 @@ def referring(of: Block, index: Array, own: Mapping[str, Any]) -> Block:
     x: Block = object.__new__(type(of))
     x.__dict__.update(own, _of=of, _index=index, _own=tuple(own))
     return x
+
+
+def head(x: Block, name: str, rows: int) -> Array:
+    """The first rows of a field (.., N): of a reference only these are gathered."""
+    if not is_reference(x) or name in x.__dict__:
+        leaf: Array = getattr(x, name)
+        return leaf[:rows]
+    of, index, _ = reference(x)
+    return take(head(of, name, rows), index)
 
 
 def changed(x: Batch, **own: Any) -> Batch:

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from restir_ref.batch import Array, changed, gathered, part, pick, put, ratio, take, total
+from restir_ref.batch import Array, changed, head, part, pick, put, ratio, take, total
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import (
@@ -49,7 +49,7 @@ def shift_path(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
     replayed = x.c == 0
     kinds = [np.flatnonzero(kind) for kind in (replayed & ~x.nee, replayed & x.nee, ~replayed)]
     order, ends = np.concatenate(kinds), np.cumsum([0, *map(len, kinds)])
-    base = gathered(take(x, order))
+    base = take(x, order)
     prefix = replay(t, base, pixel.take(order))
     F, A, J = np.zeros((t.scene.C, len(order))), np.ones(len(order)), np.zeros(len(order))
     for finish, (start, stop) in zip((_hit_end, _light_end, reconnect), pairwise(ends), strict=True):
@@ -65,7 +65,7 @@ def shift_path(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
 def replay(t: Tracer, x: Path, pixel: Array) -> Prefix:
     """Trace y_1 .. y_s with x's numbers; illegal where a pair connects before x's does."""
     s = np.where(x.c > 0, x.c - 1, np.where(x.nee, x.k, x.k + 1))
-    v, r, T = first_hit(t, x.u, pixel)
+    v, r, T = first_hit(t, head(x, "u", t.sensor.numbers), pixel)
     y = Prefix(v, r, np.zeros(len(s)), np.array(T), T.any(axis=0) | (x.k == 0))
     for i in range(1, int(s.max(initial=0))):
         columns = np.flatnonzero((s > i) & y.legal)
@@ -102,8 +102,8 @@ def _hit_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
 def _light_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     """Light sampling from y_k: F, A = 1, and whether it is legal."""
     F, legal = np.zeros_like(y.T), np.flatnonzero(y.legal)
-    at, k, u = take((y, x.k, x.u), legal)
-    leaf, _ = light_leaf(t, at.v, mat.lobe_shares(t.scene.materials, at.v), t.light_numbers(u, k))
+    base, at = take((x, y), legal)
+    leaf, _ = light_leaf(t, at.v, mat.lobe_shares(t.scene.materials, at.v), t.light_numbers(base.u, base.k))
     F[:, legal] = at.T * leaf.end
     return F, np.ones_like(y.r), y.legal
 
