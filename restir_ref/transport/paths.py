@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array, Block, ratio
+from restir_ref.batch import Array, Block, entry, ratio
 from restir_ref.guards import whole
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
@@ -110,7 +110,7 @@ class Tracer:
         start, d = self._start(i), self.scene.space.d
         if isinstance(start, int):
             return u[start + d], u[start + d + 1 : start + 2 * d]
-        pick, *point = (np.take_along_axis(u, start[None] + row, axis=0)[0] for row in range(d, 2 * d))
+        pick, *point = (entry(u, start + row) for row in range(d, 2 * d))
         return pick, np.stack(point)
 
     def _start(self, i: Any) -> Any:
