@@ -9,7 +9,7 @@ from flatland2d.pictures import eye, lights, measure, outline
 from flatland2d.scenes import Setting
 from restir_ref.batch import Array
 from restir_ref.transport.paths import Path, Tracer
-from restir_ref.transport.reading import (
+from restir_ref.transport.proofs.reading import (
     ExtendedPath,
     extended_path,
     factors,

@@ -18,9 +18,9 @@ from flatland2d.shift_pictures import Pair, pair, pair_in_words, shift_picture
 from notebooks.show import Table
 from restir_ref import Live, Pixels, initial
 from restir_ref.batch import Array, ratio, take
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import REPLAY, Path, Tracer
-from restir_ref.transport.reading import factors
+from restir_ref.transport.proofs.inversion import traced
+from restir_ref.transport.proofs.reading import factors
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.shifts import shift_path
 

@@ -132,6 +132,8 @@ def _by_light(t: Tracer, x: Path, z: Vertex) -> Path:
     if not len(ends):
         return x
     v = take(z, ends)
-    leaf, out[:, ends] = light_leaf(t, v, lobe_shares(t.scene.materials, v), t.light_numbers(x.u.take(ends, axis=-1), int(x.c[0])))
+    leaf, out[:, ends] = light_leaf(
+        t, v, lobe_shares(t.scene.materials, v), t.light_numbers(x.u.take(ends, axis=-1), int(x.c[0]))
+    )
     S[:, ends], p_light[ends] = leaf.bare, leaf.p_light
     return replace(x, S=S, p_light=p_light, out=out)

@@ -5,7 +5,7 @@ differs.  In primary sample space the Jacobian is J = A(y) / A(x) with one numbe
 density with which primary samples produce the reconnection vertex and the direction leaving it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np

@@ -12,10 +12,10 @@ from flatland2d import PLANE, SCENES
 from flatland2d.scenes import CORNELL_VIEW, LAMP, Setting, boxes, chain, room
 from restir_ref.batch import take
 from restir_ref.transport import shifts as shifts_module
-from restir_ref.transport.inversion import connection, primary_sample, traced
 from restir_ref.transport.materials import Layer, Material, evaluate_lobe
 from restir_ref.transport.paths import Connectability
-from restir_ref.transport.reading import extended_path
+from restir_ref.transport.proofs.inversion import connection, primary_sample, traced
+from restir_ref.transport.proofs.reading import extended_path
 from restir_ref.transport.scene import scene
 from restir_ref.transport.shifts import replay, shift_path
 from restir_ref.transport.vectors import norm

@@ -6,9 +6,9 @@ Unlike those of `restir_ref.oracle.zoo` they need geometry: no table of cells ha
 
 from collections.abc import Mapping
 
-from restir_ref.transport.zoo.bug import TransportBug, family
-from restir_ref.transport.zoo.samples import HISTORY_BUGS, SAMPLE_BUGS
-from restir_ref.transport.zoo.shifts import SHIFT_BUGS
+from restir_ref.transport.proofs.zoo.bug import TransportBug, family
+from restir_ref.transport.proofs.zoo.samples import HISTORY_BUGS, SAMPLE_BUGS
+from restir_ref.transport.proofs.zoo.shifts import SHIFT_BUGS
 
 TRANSPORT_BUGS: Mapping[str, TransportBug] = family([*SHIFT_BUGS, *SAMPLE_BUGS, *HISTORY_BUGS])
 WRONG_SHIFTS: Mapping[str, TransportBug] = family(SHIFT_BUGS)

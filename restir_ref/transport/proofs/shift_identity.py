@@ -16,7 +16,7 @@ import numpy as np
 from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Chance, Live
 from restir_ref.transport.paths import Path
-from restir_ref.transport.shift_checks import UNDECIDED, Case, Finding, Offender, pairs
+from restir_ref.transport.proofs.shift_checks import UNDECIDED, Case, Finding, Offender, pairs
 
 SIGMAS, NOISE, FEW, BLOCKS = 5.0, 0.05, 50, 4
 """Largest |z|; largest relative standard error of the whole; fewest paths of a kind; blocks of pixels."""

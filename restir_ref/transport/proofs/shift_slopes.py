@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from restir_ref.batch import Array, take
-from restir_ref.transport.inversion import traced
-from restir_ref.transport.shift_checks import DERIVATIVES, UNDECIDED, Case, Finding, Trial, finding, relative
+from restir_ref.transport.proofs.inversion import traced
+from restir_ref.transport.proofs.shift_checks import DERIVATIVES, UNDECIDED, Case, Finding, Trial, finding, relative
 
 STRATA, EXTREMES = 10, 3
 """Strata of log J, and how many of the smallest and of the largest J are always among the paths."""

@@ -12,8 +12,8 @@ import numpy as np
 from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, shifted
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.vectors import norm
 

@@ -8,8 +8,8 @@ import numpy as np
 from restir_ref.batch import Array, pick, ratio, take
 from restir_ref.integrals import Pixels, Shifted
 from restir_ref.transport import materials as mat
-from restir_ref.transport.inversion import connection
 from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.proofs.inversion import connection
 from restir_ref.transport.rays import emitted, light_pdf
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.vectors import norm

@@ -24,7 +24,7 @@ from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted
 from restir_ref.resampling import Candidate, select
 from restir_ref.transport.paths import Tracer, leaves, trace
-from restir_ref.transport.reading import (
+from restir_ref.transport.proofs.reading import (
     ExtendedPath,
     Factors,
     contribution,

@@ -1,12 +1,13 @@
 """Shifts that are defined where they, or their inverse, should not be."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from restir_ref.batch import Array, ratio, take
 from restir_ref.integrals import Pixels, Shifted
+from restir_ref.transport.intersection import Surfaces
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Path, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Scene
@@ -17,17 +18,27 @@ LARGEST_JACOBIAN = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Transparent(Scene):
-    """A scene in which nothing stands between two points; rays still meet surfaces."""
+class Transparent:
+    """Surfaces of which nothing stands between two points; rays still meet them."""
+
+    surfaces: Surfaces
+
+    def intersect(self, x: Array, w: Array) -> tuple[Array, Array]:
+        """As ever."""
+        return self.surfaces.intersect(x, w)
 
     def visible(self, x: Array, y: Array) -> Array:
         """Always."""
         return np.ones(x.shape[-1], dtype=bool)
 
+    def foremost(self, x: Array, prim: Array, w: Array) -> Array:
+        """As ever."""
+        return self.surfaces.foremost(x, prim, w)
 
-def transparent(scene: Scene) -> Transparent:
+
+def transparent(scene: Scene) -> Scene:
     """`scene` without shadows."""
-    return Transparent(**{each.name: getattr(scene, each.name) for each in fields(Scene)})
+    return replace(scene, surfaces=Transparent(scene.surfaces))
 
 
 def never_early(t: Tracer) -> Tracer:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from restir_ref.oracle.zoo.page import row
-from restir_ref.transport.zoo.bug import CHECKS, TransportBug
+from restir_ref.transport.proofs.zoo.bug import CHECKS, TransportBug
 
 HEAD = """
 ## In paths and shifts

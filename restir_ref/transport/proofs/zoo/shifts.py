@@ -5,9 +5,8 @@ from functools import partial
 import numpy as np
 
 from restir_ref.batch import Array, ratio
-from restir_ref.transport.vectors import power
-from restir_ref.transport.zoo.bug import TransportBug
-from restir_ref.transport.zoo.domains import (
+from restir_ref.transport.proofs.zoo.bug import TransportBug
+from restir_ref.transport.proofs.zoo.domains import (
     Loosened,
     Refused,
     anything_goes,
@@ -15,7 +14,8 @@ from restir_ref.transport.zoo.domains import (
     small,
     through_walls,
 )
-from restir_ref.transport.zoo.ends import End, Misvalued, Rescaled
+from restir_ref.transport.proofs.zoo.ends import End, Misvalued, Rescaled
+from restir_ref.transport.vectors import power
 
 
 def left_out(d: int, x: End, y: End) -> Array:

@@ -14,15 +14,15 @@ import numpy as np
 from restir_ref.batch import Array, take
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted
-from restir_ref.transport import shift_checks as by_path
-from restir_ref.transport.inversion import primary_sample
 from restir_ref.transport.lobes import KINDS
 from restir_ref.transport.paths import Path, Tracer
-from restir_ref.transport.reading import ExtendedPath, extended_path
+from restir_ref.transport.proofs import shift_checks as by_path
+from restir_ref.transport.proofs.inversion import primary_sample
+from restir_ref.transport.proofs.reading import ExtendedPath, extended_path
+from restir_ref.transport.proofs.shift_checks import NOTHING, Case, Effort, Finding, Numbers, Offender, trials
+from restir_ref.transport.proofs.shift_identity import change_of_variables
+from restir_ref.transport.proofs.shift_slopes import finite_differences
 from restir_ref.transport.restir_pt import PathIntegrals
-from restir_ref.transport.shift_checks import NOTHING, Case, Effort, Finding, Numbers, Offender, trials
-from restir_ref.transport.shift_identity import change_of_variables
-from restir_ref.transport.shift_slopes import finite_differences
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,10 @@ from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted
 from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.proofs.zoo.bug import TransportBug
+from restir_ref.transport.proofs.zoo.domains import through_walls
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.shifts import shift_path
-from restir_ref.transport.zoo.bug import TransportBug
-from restir_ref.transport.zoo.domains import through_walls
 
 
 @dataclass(frozen=True, eq=False)
