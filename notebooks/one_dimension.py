@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from figures import style
-from restir_ref import WEIGHTS, Live, Pixels, Reservoirs, Shifted, initial, shade, spatial, temporal
+from restir_ref import WEIGHTS, Live, Pixels, Reservoirs, Shifted, Weights, initial, shade, spatial, temporal
 from restir_ref.batch import Array
 from restir_ref.integrals import p_hat_from
 from restir_ref.mis import Confidences
@@ -151,7 +151,12 @@ def jacobian(power: float, mis: str) -> "Picture":
 # ---------------------------------------------------------------- MIS weights
 
 
-def shares(mis: str, nodes: int = 900) -> Mapping[str, Array]:
+def shares(mis: str) -> Mapping[str, Array]:
+    """`shares_of` the weights of that name."""
+    return shares_of(WEIGHTS[mis])
+
+
+def shares_of(mis: Weights, nodes: int = 900) -> Mapping[str, Array]:
     """The contribution MIS weights c_i(y) of seven pixels for the centre one, (7, y).  [GRIS Eq. 13, 17, 35-38]
 
     With the nodes y and, there, p_hat.
@@ -161,7 +166,7 @@ def shares(mis: str, nodes: int = 900) -> Mapping[str, Array]:
     near = [here, *(Pixels(line, np.full(nodes, i)) for i in (0, 1, 2, 4, 5, 6))]
     densities = [line.target(here.index, y), *(p_hat_from(at, y, here) for at in near[1:])]
     c = Confidences([np.ones(nodes)] * 7, [0])
-    weight = WEIGHTS[mis].c or WEIGHTS[mis].m
+    weight = mis.c or mis.m
     each = np.stack(np.broadcast_arrays(*(weight(i, lambda j: densities[j], c) for i in range(7))))
     return {"y": y, "c": np.where(np.stack(densities) > 0, each, 0.0), "p_hat": densities[0]}
 

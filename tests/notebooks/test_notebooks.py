@@ -1,11 +1,9 @@
 """Every notebook is clean, runs from top to bottom in this process, and ends with the facts that it tells."""
 
 import json
-import sys
 
 import pytest
 
-from notebooks import one_dimension, show
 from tests.checkout import ROOT
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -121,42 +119,3 @@ def test_restir_pt_frame_by_frame_tells_the_truth(capsys):
     assert (names["Z"].c == 20).all()
     assert "pixels with light" in capsys.readouterr().out
     assert 0.8 < names["film"].seen[1:].mean() < 1
-
-
-# ---------------------------------------------------------------- controls
-
-
-def png(picture):
-    return picture[1:4] == b"PNG"
-
-
-def test_a_picture_is_shown_as_png_in_the_house_style():
-    assert png(show.show(one_dimension.shift)._repr_png_())
-
-
-def test_a_control_redraws_the_picture():
-    pytest.importorskip("ipywidgets", reason="needs ipywidgets: pip install '.[notebooks]'")
-    box = show.explore(one_dimension.frozen, cap=["1", "none"])
-    cap, image = box.children
-    before = image.value
-    cap.value = "none"
-    assert png(before)
-    assert png(image.value)
-    assert image.value != before == show.show(one_dimension.frozen, "1").png
-
-
-def test_numbers_slide_in_order_from_the_first_one_given():
-    pytest.importorskip("ipywidgets", reason="needs ipywidgets: pip install '.[notebooks]'")
-    slider, _ = show.explore(one_dimension.ris, M=[4, 1, 2]).children
-    assert (slider.options, slider.value) == ((1, 2, 4), 4)
-
-
-def test_without_widgets_the_first_setting_is_shown(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ipywidgets", None)
-    assert show.explore(one_dimension.frozen, cap=["1", "none"]) == show.show(one_dimension.frozen, "1")
-
-
-def test_a_table_is_text_and_html():
-    table = show.Table(["a", "b"], [("x < y", 1)])
-    assert str(table) == "a      b\nx < y  1"
-    assert "x &lt; y" in table._repr_html_()
