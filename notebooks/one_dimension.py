@@ -138,13 +138,13 @@ def reuse(power: float, mis: str) -> Array:
 
 
 def jacobian(power: float, mis: str) -> "Picture":
-    """The mean brightness of both pixels, where 1 is right, with J to a power."""
+    """The mean brightness of both pixels, where 1 is right, with 3 standard errors."""
     (mean, error), (picture, axes) = reuse(power, mis), style.panels(width=4.6, height=2.4)
     ax = axes[0, 0]
     ax.axhline(1, color="k", lw=0.8)
     ax.errorbar([1, 2], mean, 3 * error, ls="", marker="o", ms=7, capsize=4)
-    ax.set(xlim=(0.5, 2.5), ylim=(0.5, 1.6), xticks=[1, 2], xlabel="pixel", ylabel="mean estimate / truth")
-    ax.set_title(f"J to the power {power:g}, {mis} weights, 3 standard errors")
+    ax.set(xlim=(0.5, 2.5), ylim=(0.3, 1.7), xticks=[1, 2], xlabel="pixel", ylabel="mean estimate / truth")
+    ax.set_title(f"J to the power {power:g}, {mis} weights: {mean[0]:.2f} and {mean[1]:.2f} of the truth")
     return picture
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from pprint import pformat
 from typing import Any
 
-from notebooks.show import Explored, Shown, Table
+from notebooks.show import Explored, Shown, Table, ordered
 
 NOTEBOOKS = Path(__file__).resolve().parent
 PAGES = NOTEBOOKS.parent / "docs" / "notebooks"
@@ -36,6 +36,8 @@ INDEX = """# The notebooks, run
 Five lessons with all that they show, to read here. To work with them, `make notebooks`: there the pictures
 have controls, and you write parts of ReSTIR yourself."""
 
+FENCED = re.compile(r"(```python\n.*?\n```)", re.DOTALL)
+DISPLAYED, INLINE = re.compile(r"\$\$\n(.*?)\n\$\$", re.DOTALL), re.compile(r"\$([^$`]+)\$")
 MARK = re.compile(r"^<!-- (cell-\d+) (markdown|code|shows) -->\n", re.MULTILINE)
 
 
@@ -64,11 +66,13 @@ def notebooks() -> list[Path]:
 
 def run(source: str, names: dict[str, Any], what: str) -> list[Any]:
     """What a code cell shows: printed text, and the value of its last line unless that is None."""
-    tree, printed = ast.parse(source), io.StringIO()
-    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    tree, printed, value = ast.parse(source), io.StringIO(), None
+    last = tree.body[-1] if tree.body else None
+    upto = tree.body[:-1] if isinstance(last, ast.Expr) else tree.body
     with redirect_stdout(printed):
-        exec(compile(tree, what, "exec"), names)
-        value = None if last is None else eval(compile(ast.Expression(last.value), what, "eval"), names)
+        exec(compile(ast.Module(upto, []), what, "exec"), names)
+        if isinstance(last, ast.Expr):
+            value = eval(compile(ast.Expression(last.value), what, "eval"), names)
     return [each for each in (printed.getvalue(), value) if each is not None and each != ""]
 
 
@@ -86,10 +90,12 @@ class Page:
 def page(path: Path) -> Page:
     """A notebook, run from top to bottom."""
     names: dict[str, Any] = {"__name__": "notebook"}
-    lines = [f"<!-- made by `make notebook-pages` from notebooks/{path.name} -->\n"]
+    lines = [f"<!-- made by `make notebook-pages` from notebooks/{path.name} -->"]
     pictures: dict[str, bytes] = {}
     for cell in cells(path):
-        lines.append(_mark(cell, cell.kind) + (fenced(cell.source, "python") if cell.kind == "code" else cell.source))
+        lines.append(
+            _mark(cell, cell.kind) + (fenced(cell.source, "python") if cell.kind == "code" else web(cell.source))
+        )
         if cell.kind == "code":
             shown = [in_markdown(each, f"{path.stem}/{cell.id}", pictures) for each in run(cell.source, names, cell.id)]
             lines += [_mark(cell, "shows") + "\n\n".join(shown)] if shown else []
@@ -98,6 +104,13 @@ def page(path: Path) -> Page:
 
 def _mark(cell: Cell, kind: str) -> str:
     return f"<!-- {cell.id} {kind} -->\n"
+
+
+def web(source: str) -> str:
+    """The source with formulas in backticks, where sites that show Markdown leave their backslashes alone."""
+    pieces = FENCED.split(source)
+    pieces[::2] = [INLINE.sub(r"$`\1`$", DISPLAYED.sub(r"```math\n\1\n```", text)) for text in pieces[::2]]
+    return "".join(pieces)
 
 
 def fenced(text: str, language: str = "text") -> str:
@@ -134,7 +147,7 @@ def compressed(png: bytes) -> bytes:
 
 def explored(value: Explored, name: str, pictures: dict[str, bytes]) -> str:
     """The first setting, what can be chosen in the notebook, and folded some other settings of the first control."""
-    words = "; ".join(f"`{option}`: {', '.join(map(str, values))}" for option, values in value.choices.items())
+    words = "; ".join(f"`{option}`: {', '.join(map(str, ordered(values)))}" for option, values in value.choices.items())
     first, values = next(iter(value.choices.items()))
     folded = [
         f"`{first}` = {each}\n\n" + picture(value.at(**{first: each}), f"{name}-{k}", pictures)
@@ -158,7 +171,7 @@ def index() -> str:
     lines = [INDEX]
     for path in notebooks():
         title, text = cells(path)[0].source.split("\n\n")[:2]
-        lines.append(f"## [{title.lstrip('# ')}]({path.stem}.md)\n\n{text}")
+        lines.append(f"## [{title.lstrip('# ')}]({path.stem}.md)\n\n{web(text)}")
     return "\n\n".join(lines) + "\n"
 
 
@@ -188,7 +201,9 @@ def sources(text: str) -> list[Cell]:
 
 def _unfenced(body: str, kind: str) -> str:
     body = body.rstrip("\n")
-    return body.removeprefix("```python\n").removesuffix("\n```") if kind == "code" else body
+    if kind == "code":
+        return body.removeprefix("```python\n").removesuffix("\n```")
+    return re.sub(r"```math\n(.*?)\n```", r"$$\n\1\n$$", body.replace("$`", "$").replace("`$", "$"), flags=re.DOTALL)
 
 
 def main() -> None:

@@ -61,7 +61,7 @@ def shifted(shift: str, pixels: int, roughness: float) -> "Picture":
     picture, axes = style.panels(width=7.6, height=3.2)
     found = in_corridor(shift, pixels, roughness)
     shift_picture(axes[0, 0], corridor(roughness), found)
-    return _with_legend(picture, shift, found)
+    return _with_legend(picture, f"{shift.capitalize()}, {pixels:+} pixels", found)
 
 
 def example(shift: str, number: int) -> "Picture":
@@ -70,12 +70,12 @@ def example(shift: str, number: int) -> "Picture":
     found = pair(t, take(x, np.array([number])), int(i[number]), int(i[number]) + 100)
     picture, axes = style.panels(width=6.4, height=4.0)
     shift_picture(axes[0, 0], SCENES["glossy_cornell"](), found)
-    return _with_legend(picture, shift, found)
+    return _with_legend(picture, f"Path {number}, {shift}", found)
 
 
-def _with_legend(picture: "Picture", shift: str, found: Pair) -> "Picture":
+def _with_legend(picture: "Picture", what: str, found: Pair) -> "Picture":
     (ax,) = picture.axes
-    ax.set_title(f"{shift.capitalize()}: {pair_in_words(found)}")
+    ax.set_title(f"{what}: {pair_in_words(found)}")
     ax.legend(loc="upper left", bbox_to_anchor=(1.06, 1.0))
     return picture
 

@@ -5,6 +5,7 @@ saved, exported or read where no widgets run.  Without `ipywidgets` the first va
 """
 # ruff: noqa: PLC0415
 
+import base64
 import functools
 import inspect
 import io
@@ -38,6 +39,10 @@ class Shown:
 
     def _repr_png_(self) -> tuple[bytes, dict[str, str]]:
         return self.png, {"alt": self.alt}
+
+    def _repr_html_(self) -> str:
+        """The words reach the page only this way: JupyterLab does not show those of a PNG."""
+        return f'<img alt="{escape(self.alt)}" src="data:image/png;base64,{base64.b64encode(self.png).decode()}">'
 
     def __repr__(self) -> str:
         return f"Picture: {self.alt}"
@@ -79,8 +84,8 @@ def described(draw: Draw, picture: "Picture") -> str:
     while isinstance(draw, functools.partial):
         draw = draw.func
     first = (inspect.getdoc(draw) or "A picture").split("\n")[0]
-    titles = [title for ax in picture.axes if (title := ax.get_title(loc="left") or ax.get_title())]
-    text = " ".join([first.rstrip(".") + ".", "; ".join(_plain(title) for title in titles)]).strip()
+    titles = [picture.get_suptitle(), *(ax.get_title(loc="left") or ax.get_title() for ax in picture.axes)]
+    text = " ".join([first.rstrip(".") + ".", "; ".join(_plain(title) for title in titles if title)]).strip()
     return text if len(text) <= LONGEST_ALT else text[: LONGEST_ALT - 4] + " ..."
 
 
@@ -189,8 +194,17 @@ def _control(name: str, values: Sequence[Any]) -> Any:
     """Numbers slide in ascending order, words drop down in theirs."""
     import ipywidgets
 
-    if all(isinstance(value, str) for value in values):
+    if _are_words(values):
         return ipywidgets.Dropdown(options=list(values), value=values[0], description=name)
     return ipywidgets.SelectionSlider(
-        options=sorted(values), value=values[0], description=name, continuous_update=False
+        options=ordered(values), value=values[0], description=name, continuous_update=False
     )
+
+
+def ordered(values: Sequence[Any]) -> list[Any]:
+    """Words as they are given, numbers in ascending order."""
+    return list(values) if _are_words(values) else sorted(values)
+
+
+def _are_words(values: Sequence[Any]) -> bool:
+    return all(isinstance(value, str) for value in values)

@@ -124,6 +124,17 @@ def test_a_table_is_one_of_markdown():
     assert pages.in_markdown(Table(["a", ""], [("x|y", 1)]), "name", {}) == "| a |  |\n| --- | --- |\n| x\\|y | 1 |"
 
 
+FORMULAS = "with $a\\,b$ and $c$,\n\n$$\nx \\tag{1}\n$$\n\n```python\nprice = '$1', '$2'\n```"
+
+
+def test_formulas_stand_in_backticks_and_code_stays():
+    web = pages.web(FORMULAS)
+    assert web == FORMULAS.replace("$a\\,b$ and $c$", "$`a\\,b`$ and $`c`$").replace(
+        "$$\nx \\tag{1}\n$$", "```math\nx \\tag{1}\n```"
+    )
+    assert pages.sources(f"<!-- cell-00 markdown -->\n{web}\n") == [pages.Cell("cell-00", "markdown", FORMULAS)]
+
+
 def test_compressed_pictures_look_the_same():
     png = explore(plain, letter=["a", "b"]).at().png
     before, after = (Image.open(io.BytesIO(each)).convert("RGB") for each in (png, pages.compressed(png)))

@@ -2,6 +2,7 @@
 
 import base64
 import functools
+import re
 import sys
 
 import pytest
@@ -99,6 +100,9 @@ def test_a_picture_survives_export_as_an_output_of_its_own(monkeypatch, widgets)
     found = data["image/png"]
     assert png(base64.b64decode(found) if isinstance(found, str) else found)
     assert words["image/png"]["alt"].endswith("A picturea")
+    assert re.fullmatch(
+        '<img alt="Nothing but a title. A picturea" src="data:image/png;base64,[^"]+">', data["text/html"]
+    )
 
 
 def test_a_picture_inside_a_widget_would_not_survive_export(monkeypatch):
