@@ -139,7 +139,7 @@ def reuse(power: float, mis: str) -> Array:
 
 def jacobian(power: float, mis: str) -> "Picture":
     """The mean brightness of both pixels, where 1 is right, with 3 standard errors."""
-    (mean, error), (picture, axes) = reuse(power, mis), style.panels(width=4.6, height=2.4)
+    (mean, error), (picture, axes) = reuse(power, mis), style.panels(width=5.4, height=2.4)
     ax = axes[0, 0]
     ax.axhline(1, color="k", lw=0.8)
     ax.errorbar([1, 2], mean, 3 * error, ls="", marker="o", ms=7, capsize=4)

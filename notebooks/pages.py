@@ -26,8 +26,8 @@ PAGES = NOTEBOOKS.parent / "docs" / "notebooks"
 OTHERS = 5
 """Most other settings of a control that a page shows."""
 
-COLOURS = 128
-"""Colours of a picture's file."""
+COLOURS = 256
+"""Colours of a picture's file, chosen such that a small dot keeps its own."""
 
 INDEX = """# The notebooks, run
 
@@ -141,7 +141,8 @@ def compressed(png: bytes) -> bytes:
 
     file = io.BytesIO()
     flat = Image.open(io.BytesIO(png)).convert("RGB")
-    flat.quantize(COLOURS, dither=Image.Dither.NONE).save(file, format="png", optimize=True)
+    few = flat.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    few.save(file, format="png", optimize=True)
     return file.getvalue()
 
 

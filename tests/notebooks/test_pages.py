@@ -5,13 +5,13 @@ import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 from PIL import Image
 
-from notebooks import pages
-from notebooks.show import Table, explore
+from notebooks import pages, shift_mappings
+from notebooks.show import Table, show
 from tests.checkout import ROOT
-from tests.notebooks.test_show import plain
 
 MOST_BYTES = 3_000_000
 PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)]*)\)")
@@ -135,13 +135,25 @@ def test_formulas_stand_in_backticks_and_code_stays():
     assert pages.sources(f"<!-- cell-00 markdown -->\n{web}\n") == [pages.Cell("cell-00", "markdown", FORMULAS)]
 
 
+def apart(a, b):
+    """The largest difference of two pictures in a channel, of 255."""
+    a, b = (np.asarray(each.convert("RGB"), dtype=int) for each in (a, b))
+    return abs(a - b).max()
+
+
 def test_compressed_pictures_look_the_same():
-    png = explore(plain, letter=["a", "b"]).at().png
-    before, after = (Image.open(io.BytesIO(each)).convert("RGB") for each in (png, pages.compressed(png)))
+    png = show(shift_mappings.example, "hybrid", 17).png
+    small = pages.compressed(png)
+    before, after = (Image.open(io.BytesIO(each)) for each in (png, small))
     assert before.size == after.size
-    worst = max(abs(a - b) for a, b in zip(before.tobytes(), after.tobytes(), strict=True))
-    assert worst <= 16
-    assert len(pages.compressed(png)) < len(png)
+    assert after.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
+    assert apart(before, after) <= 8
+    assert len(small) < len(png) / 2
+
+
+def test_a_small_dot_that_loses_its_colour_is_noticed():
+    before = Image.open(io.BytesIO(show(shift_mappings.example, "hybrid", 17).png)).convert("RGB")
+    assert apart(before, before.quantize(128, dither=Image.Dither.NONE)) > 32
 
 
 def test_the_readme_links_the_pages():
