@@ -161,7 +161,7 @@ def controls(explored: Explored, first: Shown, handle: Handle) -> Any:
     drawn = {tuple(control.value for control in each.values()): first}
 
     def redraw(_: Any) -> None:
-        setting = tuple(control.value for control in each.values())
+        setting, said.value = tuple(control.value for control in each.values()), ""
         if setting not in drawn:
             with _working(each.values(), said):
                 drawn[setting] = explored.at(**dict(zip(each, setting, strict=True)))

@@ -122,9 +122,9 @@ def test_without_widgets_the_first_setting_is_shown(monkeypatch):
 
 
 def test_a_control_redraws_the_picture():
-    found, (M,), _, screen = explored(one_dimension.ris, M=[1, 2])
-    M.value = 2
-    assert screen.seen == [found.at(M=2)] != [found.at()]
+    found, (letter,), _, screen = explored(plain, letter=["a", "b"])
+    letter.value = "b"
+    assert screen.seen == [found.at(letter="b")] != [found.at()]
 
 
 def test_what_was_drawn_once_is_not_drawn_again():
@@ -156,6 +156,8 @@ def test_controls_say_that_they_work_and_wait():
     assert seen == [(show.WORKING, True)]
     assert words.value.startswith("drawn in ")
     assert not letter.disabled
+    letter.value = "a"
+    assert (seen, words.value) == ([(show.WORKING, True)], "")
 
 
 def test_controls_say_what_went_wrong_and_can_be_used_again():
@@ -172,7 +174,7 @@ def test_controls_say_what_went_wrong_and_can_be_used_again():
 
 
 def test_numbers_slide_in_order_from_the_first_one_given():
-    _, (slider,), _, _ = explored(one_dimension.ris, M=[4, 1, 2])
+    _, (slider,), _, _ = explored(lambda M: plain(letter=str(M)), M=[4, 1, 2])
     assert (slider.options, slider.value) == ((1, 2, 4), 4)
 
 
