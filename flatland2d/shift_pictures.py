@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 BASE, OFFSET, JOINT = "#000000", "#56B4E9", "#D55E00"
 
 MARKS = (
-    ("o", BASE, "connectable under this rule"),
-    ("o", "w", "not connectable under it"),
+    ("o", BASE, "connectable by this rule"),
+    ("o", "w", "not connectable by it"),
     ("D", BASE, "where the paths meet"),
     ("s", "w", "on a light"),
 )

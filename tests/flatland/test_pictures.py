@@ -277,8 +277,24 @@ def test_a_legend_says_connectable_and_not_rough():
     t = gris_f05.tracer(HYBRID)
     p = shift_pictures.pair(t, gris_f05.by_hand(t, 4), gris_f05.PIXEL, gris_f05.PIXEL + 60)
     _, words = drawn(shift_pictures.shift_picture, gris_f05.corridor(), p).get_legend_handles_labels()
-    assert {"connectable under this rule", "not connectable under it", "on a light"} <= set(words)
+    assert {"connectable by this rule", "not connectable by it", "on a light"} <= set(words)
     assert not [each for each in words if "rough vertex" in each or "smooth" in each]
+
+
+def room_at_the_right(picture):
+    """Points between the legend's longest words and the edge of the picture."""
+    with style.context():
+        picture.draw_without_rendering()
+        (legend,) = [ax.get_legend() for ax in picture.axes if ax.get_legend()]
+        return picture.bbox.x1 - max(text.get_window_extent().x1 for text in legend.get_texts())
+
+
+def test_the_words_of_a_legend_stay_inside_the_picture():
+    with style.context():
+        picture = gris_f05.draw({})
+    assert room_at_the_right(picture) > 0
+    picture.axes[0].get_legend().get_texts()[0].set_text("words that are much too long for a legend beside it")
+    assert room_at_the_right(picture) < 0
 
 
 def marks(ax):
