@@ -1,6 +1,6 @@
 """The papers' figures, regenerated, and their claims, checked: `python -m figures --help`.
 
-One module per figure holds `FIGURE = Figure(...)` (see `figures.figure`); the engine around it computes the
+One module per figure holds `FIGURE = Figure(...)` (see `figures.claims.figure`); the engine around it computes the
 figure in chunks, stores them, resumes, judges the claims and writes one report.
 """
 

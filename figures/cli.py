@@ -4,17 +4,21 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
 
-from figures import audit, cluster, jobs, kept, ledger, registry, report, run, session, showings, tables, verdicts
-from figures.errors import FigureError
-from figures.figure import PRESETS
-from figures.jobs import Crew
-from figures.progress import DISABLE, Progress
-from figures.registry import Entry, Project
-from figures.verdicts import Judged
+from figures.claims import ledger, showings
+from figures.claims.errors import FigureError
+from figures.claims.figure import PRESETS, Entry
+from figures.claims.ledger import Row
+from figures.claims.verdicts import Judged
+from figures.engine import audit, cluster, jobs, kept, registry, run, session, summary
+from figures.engine.jobs import Crew
+from figures.engine.progress import DISABLE, Progress
+from figures.project import Project
+from figures.report import report, style, tables
 
 SEED = 20220711
 FOLDER = Path("out")
@@ -145,12 +149,17 @@ def _run(options: argparse.Namespace, project: Project) -> int:
     entries, rows = registry.load(project.modules), ledger.load(project.ledger)
     chosen = tuple(registry.select(entries, options.ids))
     _refuse(list(ledger.unknown(rows, chosen)))
-    progress = Progress(options.progress)
+    progress, press = Progress(options.progress), _press(rows, entries, project.paper)
     with _crew(options, chosen, progress) as crew:
-        request = session.Request(chosen, options.preset, options.seed, crew, options.out)
+        request = session.Request(chosen, options.preset, options.seed, crew, press, options.out)
         status, judged = run.run(request, rows, entries, project.paper, progress)
     _say(judged, project, options.out)
     return status
+
+
+def _press(rows: Mapping[str, Row], entries: Mapping[str, Entry], paper: Path) -> session.Press:
+    """The style of this project's pictures, and its page."""
+    return session.Press(style.drawn, partial(report.write, ledger=rows, entries=entries, paper=paper))
 
 
 def _crew(options: argparse.Namespace, chosen: Sequence[Entry], progress: Progress) -> AbstractContextManager[Crew]:
@@ -167,7 +176,7 @@ def _report(options: argparse.Namespace, project: Project) -> int:
 
 def _say(judged: Sequence[Judged], project: Project, out: Path) -> None:
     """The summary of a folder of results, and where its report stands."""
-    misfits = report.misfits(out, ledger.load(project.ledger), registry.load(project.modules), project.paper)
+    misfits = audit.misfits(out, ledger.load(project.ledger), registry.load(project.modules), project.paper)
     print(tables.summary(judged, tables.crashes(out), misfits))
     print(f"report: {out / 'index.html'}")
 
@@ -175,7 +184,7 @@ def _say(judged: Sequence[Judged], project: Project, out: Path) -> None:
 def _ledger(options: argparse.Namespace, project: Project) -> int:
     rows, entries = ledger.load(project.ledger), registry.load(project.modules)
     _refuse(list(ledger.unknown(rows, entries.values())))
-    found, newest = showings.showings(project, rows, entries), verdicts.read(options.out)
+    found, newest = showings.showings(project.tests, project.benchmarks, rows, entries), summary.read(options.out)
     paper = kept.verdicts(kept.read(project.paper), registry.declared(entries))
     listing = [tables.claim_row(row, found[id_], newest.get(id_), paper.get(id_)) for id_, row in rows.items()]
     print(json.dumps(listing, indent=1) if options.json else tables.claims(listing))
@@ -190,9 +199,9 @@ def _keep(options: argparse.Namespace, project: Project) -> int:
 
 def _audit(options: argparse.Namespace, project: Project) -> int:
     entries, rows = registry.load(project.modules), ledger.load(project.ledger)
-    problems = list(audit.problems(project, rows, entries, options.out))
+    problems = list(audit.problems(project.paper, rows, entries, options.out))
     print("\n".join([*problems, f"{len(problems)} problems" if problems else "nothing to mend"]))
-    for line in audit.remarks(project, entries):
+    for line in audit.remarks(project.paper, entries):
         print(line)
     return int(bool(problems))
 

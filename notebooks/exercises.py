@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from figures.flatland import path_tracing
+from figures.experiments.rendering import path_tracing
 from notebooks import frames, one_dimension, shift_mappings, unbiased
 from restir_ref import Live, Pixels, Reservoirs, Weights, initial, shade
 from restir_ref.batch import Array, take

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from figures import style
+from figures.report import style
 from notebooks.show import Table
 from restir_ref.batch import Array
 from restir_ref.oracle.cells import Cells, cells

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from figures import style
+from figures.report import style
 from restir_ref import WEIGHTS, Live, Pixels, Reservoirs, Shifted, Weights, initial, shade, spatial, temporal
 from restir_ref.batch import Array
 from restir_ref.integrals import p_hat_from

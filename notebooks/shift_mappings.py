@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from figures import style
-from figures.flat_scenes import whole_film
-from figures.flatland import RULES
-from figures.gris_f05 import PIXEL, by_hand, corridor, tracer
+from figures.experiments.flatland import RULES
+from figures.gris.gris_f05 import PIXEL, by_hand, corridor, tracer
+from figures.report import style
+from figures.trust.flat_scenes import whole_film
 from flatland2d import SCENES
 from flatland2d.pictures import bundle_picture, scene_picture
 from flatland2d.shift_pictures import Pair, pair, pair_in_words, shift_picture

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, Protocol
 
-from figures import style
+from figures.report import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture

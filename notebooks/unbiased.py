@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import block_diag
 
-from figures import style
+from figures.report import style
 from notebooks.show import Table
 from restir_ref import WEIGHTS, Chance, Live, Pixels, Reservoirs, Weights, initial, shade
 from restir_ref.batch import Array

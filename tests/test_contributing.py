@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from figures.figure import verdict_of
-from figures.registry import faults
+from figures.claims.figure import verdict_of
+from figures.engine.registry import faults
 from restir_ref import Live, Pixels, initial, shade
 from restir_ref.oracle.zoo import exact_bias
 from restir_ref.transport.judge import judge

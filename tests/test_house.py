@@ -14,15 +14,29 @@ from pathlib import Path
 
 import pytest
 
+from figures.project import WINGS
 from tests.checkout import ROOT, WORLDS, Module, modules, plant
 
 THEORY, TRANSPORT = "restir_ref", "restir_ref.transport"
+PAPERS = ("figures.gris", "figures.gradient", "figures.mcmc", "figures.ddgi", "figures.trust")
+"""Wings that hold nothing but figures."""
+CLAIMS, ENGINE, REPORT, SHARED = "figures.claims", "figures.engine", "figures.report", "figures.experiments"
+STORE, STYLE = "figures.engine.store", "figures.report.style"
+"""What of the engine reference images need, and what of the report a figure's `draw` needs."""
+BELOW = {THEORY, TRANSPORT, *WORLDS}
 MAY_IMPORT = {
     THEORY: {THEORY},
     TRANSPORT: {THEORY, TRANSPORT},
     **{world: {THEORY, TRANSPORT, world} for world in WORLDS},
-    "figures": {THEORY, TRANSPORT, *WORLDS, "figures"},
-    "notebooks": {THEORY, TRANSPORT, *WORLDS, "figures", "notebooks"},
+    CLAIMS: {THEORY, CLAIMS},
+    STORE: {CLAIMS, ENGINE},
+    ENGINE: {CLAIMS, ENGINE, STORE},
+    STYLE: {CLAIMS},
+    REPORT: {CLAIMS, ENGINE, STORE, REPORT, STYLE},
+    SHARED: BELOW | {CLAIMS, STORE, SHARED},
+    **{wing: BELOW | {CLAIMS, SHARED, STYLE, wing} for wing in PAPERS},
+    "figures": {CLAIMS, ENGINE, STORE, REPORT, STYLE, "figures"},
+    "notebooks": BELOW | {CLAIMS, STYLE, SHARED, *PAPERS, "notebooks"},
 }
 FLOORS = (*MAY_IMPORT, "tests", "benchmarks")
 PACKAGES = (THEORY, *WORLDS, "figures", "notebooks")
@@ -85,12 +99,30 @@ def test_imports_make_no_cycle():
 
 UPWARD = {
     "theory to world": ("restir_ref/mis.py", "import toy1d.pixels"),
-    "theory to figures": ("restir_ref/mis.py", "from figures import style"),
+    "theory to figures": ("restir_ref/mis.py", "from figures.report import style"),
     "theory to transport": ("restir_ref/mis.py", "from . import transport"),
     "oracle to transport": ("restir_ref/oracle/audit.py", "from ..transport.paths import trace"),
     "transport to world": ("restir_ref/transport/paths.py", "def late():\n    from toy1d import pixels"),
     "world to world": ("flatland2d/scenes.py", "from toy1d import pixels"),
     "figures to tests": ("figures/runner.py", "from tests import conftest"),
+    "claims to engine": ("figures/claims/ledger.py", "from figures.engine.registry import load"),
+    "store to report": ("figures/engine/store.py", "from figures.report import tables"),
+    "engine to report": ("figures/engine/run.py", "def late():\n    from figures.report.report import write"),
+    "engine to a figure": ("figures/engine/registry.py", "import figures.gris.gris_f02"),
+    "engine to theory": ("figures/engine/jobs.py", "from restir_ref import Live"),
+    "style to report": ("figures/report/style.py", "from figures.report import page"),
+    "report to a figure": ("figures/report/page.py", "from figures.gris.gris_f02 import FIGURE"),
+    "experiments to a figure": ("figures/experiments/exact.py", "from figures.mcmc import mcmc_c09"),
+    "experiments to style": ("figures/experiments/chains.py", "from figures.report import style"),
+    "experiments to engine": ("figures/experiments/offline.py", "from figures.engine import jobs"),
+    "gris to engine": ("figures/gris/gris_f02.py", "from figures.engine.jobs import stream"),
+    "gris to gradient": ("figures/gris/gris_f02.py", "from figures.gradient.gpt_f03 import Exact"),
+    "gradient to gris": ("figures/gradient/gpt_f03.py", "from figures.gris import gris_f02"),
+    "mcmc to trust": ("figures/mcmc/mcmc_1d.py", "from figures.trust.zoo import FIGURE"),
+    "ddgi to mcmc": ("figures/ddgi/probes.py", "from figures.mcmc import mcmc_1d"),
+    "trust to report": ("figures/trust/zoo.py", "from figures.report import page"),
+    "command to a figure": ("figures/cli.py", "from figures.gris import gris_f02"),
+    "notebooks to engine": ("notebooks/frames.py", "from figures.engine import run"),
 }
 
 
@@ -101,14 +133,78 @@ def test_an_import_that_points_up_is_noticed(tmp_path, path, text):
 
 def test_imports_that_point_down_are_left_alone(tmp_path):
     plant(tmp_path, "restir_ref/transport/paths.py", "from restir_ref import batch\nfrom . import vectors")
-    plant(tmp_path, "figures/two_pixels.py", "import numpy\nfrom toy1d.pixels import two_pixels")
+    plant(tmp_path, "figures/gris/two_pixels.py", "import numpy\nfrom toy1d.pixels import two_pixels")
     assert upward_imports(tmp_path) == import_cycle(tmp_path) == []
+
+
+def test_there_is_an_upward_import_from_every_wing():
+    planted = {floor(path.removesuffix(".py").replace("/", ".")) for path, _ in UPWARD.values()}
+    assert planted >= {name for name in MAY_IMPORT if name.startswith("figures")}
+
+
+def homeless(root: Path) -> list[str]:
+    """Packages in figures/ that are no wing of the house."""
+    folders = (path for path in sorted((root / "figures").iterdir()) if (path / "__init__.py").exists())
+    return [path.name for path in folders if f"figures.{path.name}" not in MAY_IMPORT]
+
+
+def test_every_package_of_figures_is_a_wing():
+    assert homeless(ROOT) == []
+    assert set(WINGS) <= set(PAPERS)
+
+
+def test_a_package_that_is_no_wing_is_noticed(tmp_path):
+    assert homeless(plant(tmp_path, "figures/attic/__init__.py", ""))
+
+
+def pictures(root: Path) -> list[str]:
+    """Modules of claims and engine that import matplotlib when the program runs."""
+    blind = [module for module in modules(root, ("figures",)) if floor(module.name) in {CLAIMS, ENGINE, STORE}]
+    return [module.name for module in blind for name in imported(untyped(module)) if name.startswith("matplotlib")]
+
+
+def test_claims_and_engine_know_no_picture():
+    assert pictures(ROOT) == []
+
+
+@pytest.mark.parametrize("path", ["claims/figure.py", "engine/finish.py", "engine/store.py"])
+def test_a_picture_in_claims_or_engine_is_noticed(tmp_path, path):
+    assert pictures(plant(tmp_path, f"figures/{path}", "def late():\n    from matplotlib.figure import Figure"))
 
 
 def test_a_cycle_is_noticed(tmp_path):
     plant(tmp_path, "toy1d/pixels.py", "from toy1d.scenes import ajar")
     assert not import_cycle(plant(tmp_path, "toy1d/scenes.py", "if TYPE_CHECKING:\n    from toy1d import pixels"))
     assert import_cycle(plant(tmp_path, "toy1d/scenes.py", "from toy1d import pixels"))
+
+
+# ---------------------------------------------------------------- figures are found, not listed
+
+
+def listed(root: Path) -> list[str]:
+    """Strings outside the figures' wings that name a module of theirs, as a list of figures would."""
+    ours = list(modules(root, ("figures",)))
+    figures = {module.path.stem for module in ours if floor(module.name) in PAPERS} - {"__init__"}
+    others = (module for module in ours if floor(module.name) not in PAPERS)
+    strings = ((module.name, text) for module in others for text in constants(module))
+    return [f"{by} names {text}" for by, text in strings if re.split(r"[./]", text.removesuffix(".py"))[-1] in figures]
+
+
+def constants(module: Module) -> Iterator[str]:
+    """The strings of a module, docstrings among them."""
+    nodes = (node.value for node in ast.walk(module.tree) if isinstance(node, ast.Constant))
+    yield from (value for value in nodes if isinstance(value, str))
+
+
+def test_no_list_of_figures_exists():
+    assert listed(ROOT) == []
+
+
+@pytest.mark.parametrize("name", ["figures.gris.gris_f02", "gris_f02", "figures/gris/gris_f02.py"])
+@pytest.mark.parametrize("path", ["project.py", "engine/registry.py", "report/page.py"])
+def test_a_list_of_figures_is_noticed(tmp_path, path, name):
+    plant(tmp_path, "figures/gris/gris_f02.py", "")
+    assert listed(plant(tmp_path, f"figures/{path}", f'MODULES = ("{name}",)'))
 
 
 # ---------------------------------------------------------------- chance
@@ -199,8 +295,7 @@ def unexplained_keys(root: Path) -> list[str]:
 
 def words(module: Module) -> Iterator[str]:
     """What a module says: strings, docstrings among them, and comments; not the code, where [SCENE] is a list."""
-    constants = (node.value for node in ast.walk(module.tree) if isinstance(node, ast.Constant))
-    yield from (value for value in constants if isinstance(value, str))
+    yield from constants(module)
     tokens = tokenize.generate_tokens(StringIO(module.path.read_text(encoding="utf-8")).readline)
     yield from (token.string for token in tokens if token.type == tokenize.COMMENT)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.jobs.job import Row
-from figures.figure import Arrays
+from figures.claims.figure import Arrays
 from restir_ref.batch import Array
 
 BLOCKS = 8

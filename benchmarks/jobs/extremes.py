@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from benchmarks.jobs.roundtrips import REACH, film
-from figures.figure import Arrays
+from figures.claims.figure import Arrays
 from flatland2d.scenes import SCENES, Setting
 from flatland2d.sensors import FILM
 from restir_ref.batch import Array, take

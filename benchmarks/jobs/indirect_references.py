@@ -25,9 +25,9 @@ from benchmarks.jobs.references import (
     row,
     traced,
 )
-from figures.figure import Arrays
-from figures.flatland import TEN
-from figures.references import INDIRECT, PATH, Reference, fingerprint, key_of, reference, save
+from figures.claims.figure import Arrays
+from figures.experiments.flatland import TEN
+from figures.experiments.references import INDIRECT, PATH, Reference, fingerprint, key_of, reference, save
 from flatland2d.radiosity import film_points, render
 from flatland2d.scenes import SCENES, Setting
 from restir_ref.batch import Array

@@ -19,8 +19,8 @@ from typing import Any, Protocol
 import numpy as np
 from tqdm import tqdm
 
-from figures import disk, store
-from figures.figure import Arrays
+from figures.claims.figure import Arrays
+from figures.engine import disk, store, syntax
 
 ROOT = Path(__file__).parents[2]
 SEED = 20_220_701
@@ -138,15 +138,11 @@ def depends(job: Job) -> str:
 
 @cache
 def code(module: str) -> str:
-    """SHA-256, shortened, over a module and all of ours that it imports: syntax trees without docstrings, and numbers.
+    """SHA-256, shortened, over the statements of a module and of all of ours that it imports, wherever they stand.
 
-    Numbers are those in an `.npz` of the module's name, such as reference images.
+    Numbers count too: those in an `.npz` of the module's name, such as reference images.
     """
-    total = hashlib.sha256()
-    for name in sorted(reached(module)):
-        total.update(_syntax(name))
-        total.update(_numbers(name))
-    return total.hexdigest()[:16]
+    return syntax.total(part for name in reached(module) for part in _syntax(name) | _numbers(name))
 
 
 def reached(module: str) -> set[str]:
@@ -179,15 +175,11 @@ def _tree(module: str) -> ast.Module:
 
 
 @cache
-def _syntax(module: str) -> bytes:
-    tree = _tree(module)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
-            node.body = node.body[1:]
-    return hashlib.sha256(ast.dump(tree).encode()).digest()
-
-
-def _numbers(module: str) -> bytes:
+def _syntax(module: str) -> frozenset[bytes]:
     path = _file(module)
-    numbers = path.with_suffix(".npz") if path else None
-    return hashlib.sha256(numbers.read_bytes()).digest() if numbers and numbers.exists() else b""
+    return syntax.statements(path, ROOT) if path else frozenset()
+
+
+def _numbers(module: str) -> frozenset[bytes]:
+    path = _file(module)
+    return syntax.numbers(path) if path else frozenset()

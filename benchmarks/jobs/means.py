@@ -15,8 +15,8 @@ import numpy as np
 
 from benchmarks.jobs.comparing import Truth, joined, judged, nothing, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
-from figures.figure import Arrays
-from figures.references import reference
+from figures.claims.figure import Arrays
+from figures.experiments.references import reference
 from flatland2d.motion import motion, sources
 from flatland2d.scenes import INSET, SCENES
 from restir_ref.batch import Array

@@ -16,7 +16,7 @@ from benchmarks.jobs.comparing import as_truth, joined, judged, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from benchmarks.jobs.means import came_from
 from benchmarks.jobs.references import lattice
-from figures.figure import Arrays
+from figures.claims.figure import Arrays
 from flatland2d.scenes import INSET, SCENES
 from restir_ref.batch import Array
 from restir_ref.chance import Live

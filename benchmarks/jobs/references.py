@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
-from figures.figure import Arrays
-from figures.references import PATH, Reference, fingerprint, save
+from figures.claims.figure import Arrays
+from figures.experiments.references import PATH, Reference, fingerprint, save
 from flatland2d.radiosity import cut, render
 from flatland2d.scenes import INSET, SCENES, Setting
 from restir_ref.batch import Array

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.jobs.job import ROOT, SEED, Done, Job, Row, depends
-from figures import disk
+from figures.engine import disk
 
 JSON, TABLE = "benchmarks/evidence.json", "docs/evidence.md"
 MEASURED_CODE = ("restir_ref", "flatland2d", "benchmarks", "tests/transport")

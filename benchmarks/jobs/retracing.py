@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from benchmarks.jobs.roundtrips import AROUND, EXAMINED, NEAR, REACH, film, lit
-from figures.figure import Arrays
+from figures.claims.figure import Arrays
 from flatland2d.scenes import SCENES
 from restir_ref.batch import Array, take
 from restir_ref.transport.inversion import traced

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
-from figures.figure import Arrays
+from figures.claims.figure import Arrays
 from flatland2d.scenes import INSET, SCENES, Setting
 from flatland2d.sensors import FILM
 from restir_ref.batch import Array, take

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.jobs.comparing import as_truth, biased, joined, judged, nothing, refined, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from benchmarks.jobs.references import coarse_and_fine, lattice
-from figures.figure import Arrays
+from figures.claims.figure import Arrays
 from flatland2d.scenes import INSET, SCENES, Setting, matte
 from restir_ref.batch import Array
 from restir_ref.chance import Live

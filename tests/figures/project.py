@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from figures.cli import main
-from figures.registry import ROOT, Project
+from figures.project import ROOT, Project
 from tests.figures.demos.stuck import STUCK
 
 

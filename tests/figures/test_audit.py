@@ -4,7 +4,9 @@ import json
 
 import pytest
 
-from figures import audit, coverage, ledger, registry
+from figures.claims import coverage, ledger
+from figures.engine import audit
+from figures.project import Project
 from tests.figures.project import claim, figures, project
 
 ROW = {"sentence": "On FS1 to FS3 and CB3-glossy", "criterion": "it falls, in flatland and 3D"}
@@ -34,7 +36,7 @@ def test_a_void_comparison_is_a_problem(tmp_path, capsys):
     assert figures(here, "run", "--out", tmp_path / "out") == 1
     capsys.readouterr()
     assert figures(here, "audit", "--out", tmp_path / "out") == 1
-    assert "DEMO-F08 crashed: figures.criteria.Void" in capsys.readouterr().out
+    assert "DEMO-F08 crashed: figures.claims.criteria.Void" in capsys.readouterr().out
 
 
 def test_an_unexpected_verdict_is_a_problem(tmp_path, capsys):
@@ -101,4 +103,4 @@ def test_evidence_that_does_not_hold_shows_nothing(shown):
 
 
 def test_our_own_criteria_name_the_scenes_and_worlds_of_their_rows():
-    assert list(audit.criteria(ledger.load(registry.Project().ledger))) == []
+    assert list(audit.criteria(ledger.load(Project().ledger))) == []

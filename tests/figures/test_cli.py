@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from figures import outdir
 from figures.cli import main
-from figures.registry import ROOT, Project
+from figures.engine import outdir
+from figures.project import ROOT, Project
 from tests.figures.demos import sound
 from tests.figures.project import claim, figures, project
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from figures import code, plan, store
+from figures.engine import code, plan, store, syntax
+from tests.checkout import plant
 
 KEY = '{"code": "a", "seed": 1}'
 
@@ -38,17 +39,17 @@ def test_the_digest_sees_statements_but_no_comments(tmp_path, monkeypatch):
     package.mkdir()
     monkeypatch.syspath_prepend(tmp_path)
     found = []
-    for text in ("a = 1\n", "a = 1  # one\n", "a = 2\n"):
+    for text in ("a = 1\n", '"""Words."""\na = 1  # one\n', "a = 2\n"):
         (package / "__init__.py").write_text(text)
         code._syntax.cache_clear()
         code._package.cache_clear()
-        found.append(code.digest("figures.gris_f02", "some_world"))
+        found.append(code.digest("figures.gris.gris_f02", "some_world"))
     assert found[0] == found[1] != found[2]
 
 
 MODULE = """
-from figures import offline
-from figures.flatland import view
+from figures.experiments import offline
+from figures.experiments.flatland import view
 
 SCALE, UNUSED = 2.0, 3.0
 
@@ -99,5 +100,54 @@ def test_the_digest_sees_the_numbers_beside_a_module(tmp_path, monkeypatch):
     found = []
     for number in (1.0, 1.0, 2.0):
         np.savez(package / "__init__.npz", number=number)
-        found.append(code.digest("figures.gris_f02", "other_world"))
+        found.append(code.digest("figures.gris.gris_f02", "other_world"))
     assert found[0] == found[1] != found[2]
+
+
+# ---------------------------------------------------------------- where code stands
+
+BEFORE = {
+    "lobes.py": "def f(x):\n    return x",
+    "paths.py": "from ours import lobes\nfrom ours.lobes import f\nfrom numpy import pi\ny, z = f(pi), lobes.f(1)",
+}
+INTO_A_WING = {
+    "wing/__init__.py": '"""A wing."""',
+    "wing/lobes.py": '"""Words."""\n' + BEFORE["lobes.py"],
+    "paths.py": BEFORE["paths.py"].replace("from ours", "from ours.wing"),
+}
+IN_ANOTHER_ORDER = BEFORE | {
+    "paths.py": "from numpy import pi\n" + BEFORE["paths.py"].replace("from numpy import pi\n", "")
+}
+CHANGED = {
+    "a statement": ("wing/lobes.py", "return x", "return -x"),
+    "a name of ours": ("paths.py", "import f", "import g as f"),
+    "a module of ours": ("paths.py", "wing.lobes import", "wing.shapes import"),
+    "a package of others": ("paths.py", "numpy", "scipy.constants"),
+}
+
+
+def said(root, texts):
+    """The digest of a package with these modules."""
+    for name, text in {"__init__.py": "", **texts}.items():
+        plant(root, f"ours/{name}", text)
+    return syntax.total(part for path in root.rglob("*.py") for part in syntax.statements(path, root))
+
+
+@pytest.mark.parametrize("after", [INTO_A_WING, IN_ANOTHER_ORDER], ids=["a wing", "another order"])
+def test_code_that_only_moves_keeps_its_digest(tmp_path, after):
+    assert said(tmp_path / "before", BEFORE) == said(tmp_path / "after", after)
+
+
+@pytest.mark.parametrize(("path", "old", "new"), CHANGED.values(), ids=CHANGED)
+def test_code_that_changes_on_its_way_is_noticed(tmp_path, path, old, new):
+    after = INTO_A_WING | {path: INTO_A_WING[path].replace(old, new)}
+    assert after != INTO_A_WING
+    assert said(tmp_path / "before", BEFORE) != said(tmp_path / "after", after)
+
+
+def test_a_figure_that_moves_to_another_wing_keeps_its_results(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    for wing in ("one_wing", "other_wing"):
+        plant(plant(tmp_path, f"{wing}/__init__.py", ""), f"{wing}/some_figure.py", MODULE)
+    names = ("one_wing.some_figure", "other_wing.some_figure")
+    assert len({(code.digest(name, "toy1d"), code.own(name)) for name in names}) == 1

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from figures import criteria, registry
-from figures.figure import Conditions, Setup
-from figures.plan import arms, plan, stream
+from figures.claims import criteria
+from figures.claims.figure import Conditions, Setup
+from figures.engine import registry
+from figures.engine.plan import arms, plan, stream
 from tests.figures.demos.sound import figure
 from tests.figures.project import figures, project
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, stdtr
 
-from figures import criteria
-from figures.criteria import Outcome
+from figures.claims import criteria
+from figures.claims.criteria import Outcome
 
 N = 2.0 ** np.arange(9)
 REPLICATES = 1.0 + 1e-3 * np.random.default_rng(1).standard_normal(64)

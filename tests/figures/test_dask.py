@@ -13,9 +13,10 @@ from importlib.util import find_spec
 
 import pytest
 
-from figures import cluster, jobs, preflight
-from figures.errors import FigureError
-from figures.registry import ROOT, load
+from figures.claims.errors import FigureError
+from figures.engine import cluster, jobs, preflight
+from figures.engine.registry import load
+from figures.project import ROOT
 from tests.figures.demos import strange
 from tests.figures.demos.stuck import STUCK
 from tests.figures.project import arrays, figures, project
@@ -123,10 +124,10 @@ STRANGE = {
     "python": ("platform", "python_version", strange.other_version, "python is 0.9.9 there and 3."),
     "numpy": ("numpy", "__version__", "0.9.9", "numpy is 0.9.9 there"),
     "scipy": ("scipy", "__version__", "0.9.9", "scipy is 0.9.9 there"),
-    "restir-ref": ("figures.manifest", "version", strange.other_version, "restir-ref is 0.9.9 there"),
-    "code": ("figures.preflight", "_code", strange.other_code, "code of DEMO-F01 is 1 there and"),
+    "restir-ref": ("figures.engine.manifest", "version", strange.other_version, "restir-ref is 0.9.9 there"),
+    "code": ("figures.engine.preflight", "_code", strange.other_code, "code of DEMO-F01 is 1 there and"),
     "threads": ("threadpoolctl", "threadpool_info", strange.four_threads, "BLAS threads is 4 there and 1 here"),
-    "a package": ("figures.preflight", "identity", strange.no_package, "No module named 'figures'"),
+    "a package": ("figures.engine.preflight", "identity", strange.no_package, "No module named 'figures'"),
 }
 
 
@@ -155,7 +156,7 @@ def test_a_worker_that_differs_is_refused_by_name_with_the_remedy(tmp_path, caps
 
 @needs_dask
 def test_another_kind_of_processor_is_told(tmp_path, capsys, client):
-    with altered(client, ("figures.preflight", "arithmetic", strange.other_version, "")):
+    with altered(client, ("figures.engine.preflight", "arithmetic", strange.other_version, "")):
         words = ("run", "--dask", client.scheduler.address, "--out", tmp_path / "out")
         assert figures(project(tmp_path, "sound"), *words) == 0
     assert "another kind of processor" in capsys.readouterr().err

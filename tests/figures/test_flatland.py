@@ -5,23 +5,21 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from figures import gris_f14, gris_f17, offline
-from figures.flatland import (
-    HYBRID,
+from figures.experiments import offline
+from figures.experiments.flatland import HYBRID, TEN, moving, view
+from figures.experiments.realtime import MARGIN, METHODS, STEP, costed, inset, widened
+from figures.experiments.references import INDIRECT, reference
+from figures.experiments.rendering import (
     POINTS,
-    TEN,
     estimates,
     film,
     lattice_tracing,
-    moving,
     path_tracing,
     samples_of_equal_cost,
     spatial_only,
-    view,
 )
-from figures.realtime import MARGIN, METHODS, STEP, costed, inset, widened
-from figures.references import INDIRECT, reference
-from figures.split_light import IndirectIntegrals, direct_film, without_direct
+from figures.experiments.split_light import IndirectIntegrals, direct_film, without_direct
+from figures.gris import gris_f14, gris_f17
 from flatland2d import PLANE, SCENES
 from flatland2d.scenes import LAMP, chain, matte, room
 from flatland2d.sensors import Pinhole

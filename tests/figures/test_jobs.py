@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from figures import jobs
-from figures.jobs import Job
-from figures.registry import ROOT
+from figures.engine import jobs
+from figures.engine.jobs import Job
+from figures.project import ROOT
 
 SOUND = "tests.figures.demos.sound"
 WORK = [Job(SOUND, "DEMO-F01", {"chunks": 5, "n": 4}, k, {"first": k}, 1, k) for k in range(5)]
@@ -75,7 +75,7 @@ BY_HASH = "lambda seed, figure, number: np.random.default_rng([seed, hash(figure
 
 def in_another_process(stream: str, hash_seed: str):
     """The first numbers of every key's stream, made by an expression in a new interpreter."""
-    code = f"import json, numpy as np; from figures import jobs; made = {stream}; keys = {KEYS}"
+    code = f"import json, numpy as np; from figures.engine import jobs; made = {stream}; keys = {KEYS}"
     code += "; print(json.dumps([made(*key).integers(2**62, size=2).tolist() for key in keys]))"
     env = os.environ | {"PYTHONHASHSEED": hash_seed}
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=env, capture_output=True, text=True, check=True)

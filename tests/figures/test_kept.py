@@ -4,8 +4,10 @@ import json
 
 import pytest
 
-from figures import code, kept, registry
-from figures.errors import FigureError
+from figures.claims import ledger
+from figures.claims.errors import FigureError
+from figures.engine import code, kept, registry
+from figures.project import Project
 from tests.figures.demos.dropping import DROPPING
 from tests.figures.project import claim, figures, project
 
@@ -105,15 +107,13 @@ def test_a_damaged_file_of_kept_runs_is_named(tmp_path, text):
 
 
 def test_our_own_ledger_expects_what_our_own_kept_runs_found():
-    mine = registry.Project()
-    from figures import ledger  # noqa: PLC0415
+    mine = Project()
 
     assert list(kept.unexpected(kept.read(mine.paper), registry.load(mine.modules), ledger.load(mine.ledger))) == []
 
 
 def test_our_own_ledger_expects_nothing_of_the_paper_preset_that_no_kept_run_found():
-    mine = registry.Project()
-    from figures import ledger  # noqa: PLC0415
+    mine = Project()
 
     found = kept.verdicts(kept.read(mine.paper), registry.declared(registry.load(mine.modules)))
     expected = {id_: row.expected["paper"] for id_, row in ledger.load(mine.ledger).items()}

@@ -5,9 +5,11 @@ import textwrap
 
 import pytest
 
-from figures import ledger, registry, scan
-from figures.errors import FigureError
-from figures.figure import PRESETS
+from figures.claims import ledger, scan
+from figures.claims.errors import FigureError
+from figures.claims.figure import PRESETS
+from figures.engine import registry
+from figures.project import Project
 from tests.figures.project import claim, figures, project
 
 KNOWN = ("A-1", "A-2", "A-3")
@@ -233,11 +235,11 @@ def test_a_declared_claim_without_an_expected_verdict_is_listed(tmp_path):
 
 
 def test_our_own_figures_declare_claims_of_our_ledger_with_expected_verdicts():
-    entries, rows = registry.load(registry.MODULES).values(), ledger.load(registry.Project().ledger)
+    entries, rows = registry.load(Project().modules).values(), ledger.load(Project().ledger)
     assert list(ledger.unknown(rows, entries)) == []
     assert list(ledger.unmeasured(rows, entries, PRESETS[0])) == []
 
 
 def test_our_own_tests_mark_claims_of_our_ledger():
-    here = registry.Project()
+    here = Project()
     assert scan.marks_by_claim(here.tests, ledger.load(here.ledger))

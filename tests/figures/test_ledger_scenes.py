@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from figures.coverage import WORDS, missing
-from figures.registry import Project
+from figures.claims.coverage import WORDS, missing
+from figures.project import Project
 
 ROWS = {row["id"]: row for row in json.loads(Project().ledger.read_text(encoding="utf-8"))["claims"]}
 

@@ -5,14 +5,16 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from figures import corners, gris_c10, gris_c12
-from figures.flatland import HYBRID, TEN, film, moving, view
-from figures.gris_f01 import CAUSTIC, GLOSSY, PIXELS
-from figures.gris_f01 import film as film_of
-from figures.gris_f12 import glossiest
-from figures.indirect import METHODS, darkened
-from figures.realtime import FRAMES, MARGIN, STEP, costed, sideways, widened
-from figures.split_light import without_direct
+from figures.experiments import corners
+from figures.experiments.flatland import HYBRID, TEN, moving, view
+from figures.experiments.indirect import METHODS, darkened
+from figures.experiments.realtime import FRAMES, MARGIN, STEP, costed, sideways, widened
+from figures.experiments.rendering import film
+from figures.experiments.split_light import without_direct
+from figures.gris import gris_c10, gris_c12
+from figures.gris.gris_f01 import CAUSTIC, GLOSSY, PIXELS
+from figures.gris.gris_f01 import film as film_of
+from figures.gris.gris_f12 import glossiest
 from flatland2d import SCENES
 from flatland2d.gbuffer import gbuffer
 from flatland2d.sensors import FILM

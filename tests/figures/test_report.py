@@ -6,9 +6,9 @@ from html.parser import HTMLParser
 import matplotlib as mpl
 import pytest
 
-from figures import style
-from figures.figure import VERDICTS
-from figures.page import SYMBOLS, badge
+from figures.claims.figure import VERDICTS
+from figures.report import style
+from figures.report.page import SYMBOLS, badge
 from tests.figures.demos.sound import picture
 from tests.figures.project import figures, project
 

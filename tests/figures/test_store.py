@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis.extra import numpy as hnp
 
-from figures import disk, store
-from figures.errors import FigureError
+from figures.claims.errors import FigureError
+from figures.engine import disk, store
 
 ARRAYS = {"b": np.arange(6.0).reshape(2, 3).T, "a": np.array("text"), "none": np.zeros((0, 2))}
 KEY = store.canonical({"figure": "DEMO-F01", "seed": 1})

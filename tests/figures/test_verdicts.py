@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from figures import record, verdicts
-from figures.criteria import above, below, reported, within
-from figures.errors import FigureError
-from figures.figure import VERDICTS, Claim, Conditions, Setup, undeclared, verdict_line, verdict_of, worst
-from figures.ledger import Row
-from figures.record import Check, Record
+from figures.claims import verdicts
+from figures.claims.criteria import above, below, reported, within
+from figures.claims.errors import FigureError
+from figures.claims.figure import VERDICTS, Claim, Conditions, Setup, undeclared, verdict_line, verdict_of, worst
+from figures.claims.ledger import Row
+from figures.claims.verdicts import Check, Record
+from figures.engine import record, summary
 from tests.figures.demos.sound import figure
 
 HIT, MISS = within(0, 0, 1), within(3, 0, 1)
@@ -124,19 +125,19 @@ def test_a_verdict_names_the_worlds_that_decided_it():
 
 def test_kept_verdicts_are_read_back(tmp_path):
     rows = verdicts.judge([found("F-1", "reproduced", "refuted")], {"A-1": row(None)}, {"A-1": {"F-1"}})
-    verdicts.write(rows, tmp_path)
-    assert verdicts.read(tmp_path) == {"A-1": "refuted"}
+    summary.write(rows, tmp_path)
+    assert summary.read(tmp_path) == {"A-1": "refuted"}
 
 
 def test_a_folder_without_verdicts_has_none(tmp_path):
-    assert verdicts.read(tmp_path) == {}
+    assert summary.read(tmp_path) == {}
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"verdicts": [{"id": "A-1"}]}', '{"verdicts": [{"id":1,"verdict":"x"}]}'])
 def test_damaged_verdicts_are_named(tmp_path, text):
-    (tmp_path / verdicts.NAME).write_text(text)
+    (tmp_path / summary.NAME).write_text(text)
     with pytest.raises(FigureError, match=r"verdicts\.json is damaged"):
-        verdicts.read(tmp_path)
+        summary.read(tmp_path)
 
 
 def test_a_kept_record_is_read_back(tmp_path):

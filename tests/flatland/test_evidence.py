@@ -187,13 +187,13 @@ def test_the_digest_of_code_sees_the_numbers_beside_a_module(tmp_path, monkeypat
     def digest(number: float) -> str:
         for cached in (job.code, job._imports, job._syntax):
             cached.cache_clear()
-        np.savez(tmp_path / "figures" / "references.npz", mean=number)
+        np.savez(tmp_path / "figures" / "experiments" / "references.npz", mean=number)
         return job.code("benchmarks.one")
 
     monkeypatch.setattr(job, "ROOT", tmp_path)
-    plant(tmp_path, "benchmarks/one.py", "from figures.references import reference")
+    plant(tmp_path, "benchmarks/one.py", "from figures.experiments.references import reference")
     plant(tmp_path, "figures/__init__.py", "")
-    plant(tmp_path, "figures/references.py", "def reference():\n    pass\n")
+    plant(tmp_path, "figures/experiments/references.py", "def reference():\n    pass\n")
     assert digest(1.0) == digest(1.0) != digest(2.0)
     for cached in (job.code, job._imports, job._syntax):
         cached.cache_clear()

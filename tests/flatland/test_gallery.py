@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from figures import flat_scenes, gris_f05, style
-from figures.figure import undeclared, verdict_of
+from figures.claims.figure import undeclared, verdict_of
+from figures.gris import gris_f05
+from figures.report import style
+from figures.trust import flat_scenes
 from flatland2d import SCENES, shift_pictures
 from restir_ref.transport import record
 from tests.core.stubs import live

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from figures import gris_x, offline
-from figures.figure import undeclared, verdict_of
-from figures.references import INDIRECT, reference
+from figures.claims.figure import undeclared, verdict_of
+from figures.experiments import offline
+from figures.experiments.references import INDIRECT, reference
+from figures.gris import gris_x
 from restir_ref.chance import Live
 
 SCENE = "cornell"

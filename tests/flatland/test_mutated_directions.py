@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from figures import mcmc_e05
-from figures.mcmc_e05 import Base, Moved, base_paths, by_angles, by_numbers, over_angles, over_numbers
+from figures.mcmc import mcmc_e05
+from figures.mcmc.mcmc_e05 import Base, Moved, base_paths, by_angles, by_numbers, over_angles, over_numbers
 from flatland2d import SCENES
 from restir_ref.batch import Array, where
 from restir_ref.chance import Live

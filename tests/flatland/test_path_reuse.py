@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from figures.criteria import sidak, unbiased
+from figures.claims.criteria import sidak, unbiased
 from flatland2d import PLANE, SCENES, Pinhole
 from flatland2d.scenes import LAMP, chain, matte, room
 from restir_ref.batch import Array

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from figures import flat_scenes, gris_f05, style
+from figures.gris import gris_f05
+from figures.report import style
+from figures.trust import flat_scenes
 from flatland2d import SCENES, pictures, shift_pictures
 from flatland2d.fluence import direct, fluence, fluence_map
 from flatland2d.scenes import FURNACE_ALBEDO

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from figures.references import reference
+from figures.experiments.references import reference
 from flatland2d import PLANE, SCENES, Pinhole, radiosity
 from flatland2d.radiosity import cut, gather, render, shares
 from flatland2d.scenes import FURNACE_ALBEDO, INSET, LAMP, Setting, chain, matte, room
@@ -167,7 +167,7 @@ def test_sixty_panels_per_segment_err_by_less_than_a_twentieth_of_a_per_cent(sce
 
 @every_scene
 def test_twice_the_panels_have_a_quarter_of_the_errors_or_less(scene) -> None:
-    """Pixel by pixel, so that nothing cancels, against the far more panels of `figures/references.npz`."""
+    """Pixel by pixel, so that nothing cancels, against the far more panels of `figures/experiments/references.npz`."""
     truth = reference(scene)
     floor = np.sqrt((truth.error**2).mean())
     coarse, fine = (np.sqrt(((image(scene, n) - truth.mean) ** 2).mean()) for n in (PANELS // 3, PANELS))

@@ -7,10 +7,10 @@ import pytest
 
 from benchmarks.jobs.indirect_references import direct
 from benchmarks.jobs.references import has_radiosity, moved
-from figures import references
-from figures.errors import FigureError
-from figures.flatland import TEN
-from figures.references import INDIRECT, Reference, fingerprint, key_of, reference, save
+from figures.claims.errors import FigureError
+from figures.experiments import references
+from figures.experiments.flatland import TEN
+from figures.experiments.references import INDIRECT, Reference, fingerprint, key_of, reference, save
 from flatland2d import SCENES
 from flatland2d.radiosity import render
 from flatland2d.scenes import INSET

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from figures import jobs
+from figures.engine import jobs
 from flatland2d import SCENES
 from restir_ref.batch import Array
 from restir_ref.chance import Live

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from figures.criteria import all_unbiased, biased, mean_and_blocks, unbiased
-from figures.gris_f15di import shadow_edges
+from figures.claims.criteria import all_unbiased, biased, mean_and_blocks, unbiased
+from figures.gris.gris_f15di import shadow_edges
 from flatland2d import PLANE, SCENES, Pinhole
 from flatland2d.radiosity import cut, gather
 from flatland2d.scenes import LAMP, chain, matte, room

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from figures.criteria import all_unbiased, biased, mean_and_blocks, unbiased
+from figures.claims.criteria import all_unbiased, biased, mean_and_blocks, unbiased
 from flatland2d import SCENES
 from restir_ref.batch import Array, take
 from restir_ref.chance import Live

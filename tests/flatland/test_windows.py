@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from figures import gris_f07flat, gris_f09flat
-from figures.criteria import Outcome
-from figures.figure import Claim, undeclared, verdict_of
-from figures.gris_f07flat import Kept, around, grouped, one_pass, realised, window_of
-from figures.split_light import IndirectIntegrals
+from figures.claims.criteria import Outcome
+from figures.claims.figure import Claim, undeclared, verdict_of
+from figures.experiments.split_light import IndirectIntegrals
+from figures.gris import gris_f07flat, gris_f09flat
+from figures.gris.gris_f07flat import Kept, around, grouped, one_pass, realised, window_of
 from restir_ref.batch import Array
 from restir_ref.integrals import Pixels
 from restir_ref.mis import WEIGHTS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from figures.flatland import path_tracing
+from figures.experiments.rendering import path_tracing
 from notebooks import frames, shift_mappings
 from restir_ref import Live
 

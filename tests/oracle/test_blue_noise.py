@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from figures.mcmc_1d import BLUE, MOST, six_cells
+from figures.mcmc.mcmc_1d import BLUE, MOST, six_cells
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.decorrelation import Blue, Move, annealed, energy, metropolis, mutate

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from figures.gris_e41 import sticky_share
+from figures.gris.gris_e41 import sticky_share
 from restir_ref.batch import Array, ratio, total, where
 from restir_ref.chance import Chance, Live
 from restir_ref.integrals import Image, Pixels, Reservoirs, target

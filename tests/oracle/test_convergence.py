@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from figures import criteria, gris_a2
-from figures.exact import integral
+from figures.claims import criteria
+from figures.experiments.exact import integral
+from figures.gris import gris_a2
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs, pdf

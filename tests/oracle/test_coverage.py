@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from figures import gris_a2, gris_c15
-from figures.random_frames import random_frame
+from figures.experiments.random_frames import random_frame
+from figures.gris import gris_a2, gris_c15
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from figures.mcmc_1d import MOST, RIGHT, WALKS, moved_weight, predicted, six_cells
+from figures.mcmc.mcmc_1d import MOST, RIGHT, WALKS, moved_weight, predicted, six_cells
 from restir_ref.batch import Array
 from restir_ref.decorrelation import STEPS, attempt, metropolis, mutate
 from restir_ref.integrals import Pixels, Reservoirs

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from figures.gpt_f03 import Exact
+from figures.gradient.gpt_f03 import Exact
 from restir_ref.batch import Array, ratio
 from restir_ref.gradient import (
     SIGNS,

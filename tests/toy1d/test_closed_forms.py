@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from figures.criteria import biased, unbiased
-from figures.exact import integral
+from figures.claims.criteria import biased, unbiased
+from figures.experiments.exact import integral
 from restir_ref.batch import Array
 from restir_ref.integrals import Pixels
 from restir_ref.restir import initial, resample, shade

@@ -5,8 +5,18 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from figures.chains import chain, images, nobody, random_neighbour, three_of_radius_5
-from figures.exact import Loop, accumulated, copied, integral, shaded, shaded_beside, start, step, sum_of_weights
+from figures.experiments.chains import chain, images, nobody, random_neighbour, three_of_radius_5
+from figures.experiments.exact import (
+    Loop,
+    accumulated,
+    copied,
+    integral,
+    shaded,
+    shaded_beside,
+    start,
+    step,
+    sum_of_weights,
+)
 from restir_ref.batch import Array
 from restir_ref.integrals import Pixels
 from restir_ref.mis import WEIGHTS

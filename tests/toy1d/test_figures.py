@@ -2,17 +2,18 @@
 
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from figures import gris_c06, gris_f09, gris_f10, style
-from figures.exact import Loop
-from figures.figure import Arrays, Figure, undeclared, verdict_of, worst
-from figures.jobs import stream
-from figures.ledger import load
+from figures.claims.figure import Arrays, Figure, undeclared, verdict_of, worst
+from figures.claims.ledger import load
+from figures.engine.jobs import stream
+from figures.experiments.exact import Loop
+from figures.gris import gris_c06, gris_f09, gris_f10
+from figures.project import Project
+from figures.report import style
 from tests.core.stubs import live
 from toy1d import quotient, two_pixels
 
@@ -39,7 +40,7 @@ PASSES = ("reproduced", "reproduced with caveat")
 
 def differing(figure: Figure, arrays: Arrays) -> dict[str, str]:
     """Claims that do not pass, or not as the ledger expects, which may be worse where flatland judges them too."""
-    rows = load(Path(style.__file__).with_name("ledger.json"))
+    rows = load(Project().ledger)
     found, wanted = worst_of_each(figure, arrays), {id_: rows[id_].expected["quick"] for id_ in figure.claims}
     elsewhere = {id_ for id_ in figure.claims if wanted[id_] not in PASSES}
     assert elsewhere <= {"GRIS-F08"}
@@ -74,7 +75,7 @@ SMALL = [
 
 @pytest.mark.parametrize(("name", "changes", "array", "spoil"), SMALL)
 def test_the_claims_hold_and_spoilt_numbers_do_not_pass(name, changes, array, spoil):
-    figure = import_module(f"figures.gris_{name}").FIGURE
+    figure = import_module(f"figures.gris.gris_{name}").FIGURE
     arrays = made(figure, {**figure.presets["quick"], **changes})
     assert differing(figure, arrays) == {}
     assert "not reproduced" in verdicts(figure, spoilt(arrays, array, spoil))

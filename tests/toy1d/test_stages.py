@@ -10,8 +10,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from figures.chains import random_neighbour, three_of_radius_5
-from figures.criteria import Outcome, biased, unbiased
+from figures.claims.criteria import Outcome, biased, unbiased
+from figures.experiments.chains import random_neighbour, three_of_radius_5
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.decorrelation import mutate

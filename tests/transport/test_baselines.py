@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from figures.criteria import all_unbiased
+from figures.claims.criteria import all_unbiased
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels

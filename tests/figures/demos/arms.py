@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from figures.criteria import above
-from figures.figure import Claim
+from figures.claims.criteria import above
+from figures.claims.figure import Claim
 from tests.figures.demos.sound import figure
 
 

@@ -2,8 +2,8 @@
 
 import os
 
-from figures.criteria import within
-from figures.figure import Claim
+from figures.claims.criteria import within
+from figures.claims.figure import Claim
 from tests.figures.demos.sound import figure
 
 DROPPING = "DEMO_DROPS_A_PART"

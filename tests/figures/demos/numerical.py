@@ -4,8 +4,8 @@ import time
 
 import numpy as np
 
-from figures.criteria import above
-from figures.figure import Claim
+from figures.claims.criteria import above
+from figures.claims.figure import Claim
 from restir_ref import WEIGHTS, Live, Pixels, initial, shade, spatial
 from tests.figures.demos.sound import figure
 from toy1d import overlapping_supports

@@ -1,7 +1,7 @@
 """A figure that measures the opposite of its claim with certainty."""
 
-from figures.criteria import above, below
-from figures.figure import Claim
+from figures.claims.criteria import above, below
+from figures.claims.figure import Claim
 from tests.figures.demos.sound import figure
 
 

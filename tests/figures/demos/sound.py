@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from figures import style
-from figures.criteria import within
-from figures.figure import Claim, Figure
+from figures.claims.criteria import within
+from figures.claims.figure import Claim, Figure
+from figures.report import style
 
 SIZES = {"quick": {"chunks": 3, "n": 50}, "paper": {"chunks": 4, "n": 200}}
 

@@ -1,0 +1,158 @@
+"""Real-time renderers in flatland: chains of frames, their camera still or moving two to three pixels per frame.
+
+A moving inset is the middle of a wider row: what enters at the row's ends has no neighbours beyond them and no
+history of its own, as happens at the ends of a film of 1920 pixels only.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from figures.claims.figure import Arrays
+from figures.experiments.flatland import HYBRID, displaced, view
+from figures.experiments.rendering import Traced, estimates, film, means, path_tracing, samples_of_equal_cost
+from flatland2d import SCENES
+from flatland2d.motion import motion
+from flatland2d.sensors import Pinhole
+from restir_ref.batch import Array
+from restir_ref.chance import Chance, Live
+from restir_ref.transport.counting import counted, rays
+from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
+from restir_ref.transport.restir_gi import RadianceIntegrals
+from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
+
+FRAMES = 20
+"""Frames of a chain; the last one is judged, or of a still camera the last half."""
+
+STEP = 0.001
+"""Units of length that the camera moves per frame."""
+
+MARGIN = 64
+"""Pixels rendered on either side of a moving inset: about as far as anything moves in a chain."""
+
+MOTION_RAYS = 2
+"""Rays of a pixel's motion vector.  Replicas share it here, but each is charged for its own."""
+
+TREES_IN_A_FRAMES_TIME: Mapping[str, int] = MappingProxyType(
+    {
+        "cornell": 6,
+        "glossy_cornell": 11,
+        "ajar": 7,
+        "crease": 7,
+        "occluders": 6,
+        "checker": 7,
+        "rack": 6,
+        "glass_disc": 11,
+        "distant_caustic": 10,
+        "clear_coat": 9,
+    }
+)
+"""Path trees that take as long as one hybrid frame per pixel, rounded up: CPU time, measured once (5.6 to 10.3)."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """What ReSTIR shares between pixels: a rule of connections, and integrals with their shift."""
+
+    rule: Connectability
+    integrals: Callable[[Tracer], Traced] = PathIntegrals
+
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "hybrid": Method(HYBRID),
+        "no distance test": Method(Connectability(HYBRID.roughness, 0.0)),
+        "reconnection": Method(RECONNECTION, ReconnectionAtX2),
+        "ReSTIR GI": Method(RECONNECTION, RadianceIntegrals),
+    }
+)
+
+
+LOOKS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "path tracing": {"color": "#E69F00", "ls": "-."},
+        "ReSTIR GI": {"color": "#56B4E9", "ls": (0, (5, 1, 1, 1, 1, 1))},
+        "reconnection": {"color": "#D55E00", "ls": "--"},
+        "no distance test": {"color": "#000000", "ls": ":"},
+        "hybrid": {"color": "#0072B2", "ls": "-"},
+    }
+)
+"""Lines of the methods in pictures."""
+
+
+def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
+    """The last frame of a moving camera, (replicas, n), and its rays per pixel; the scene's inset unless told."""
+    asked = Counter[str]()
+    views = [method.integrals(view(scene, method.rule, asked, each).tracer) for each in widened(scene, sensor)]
+    *_, (images, cost) = costed(views, asked, replicas, Live(rng))
+    return {"images": inset(images), "rays": np.array(cost)}
+
+
+def still(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
+    """The first frame and the last half of a still camera's, (1 + FRAMES // 2, replicas, n), and rays per pixel."""
+    asked = Counter[str]()
+    of = method.integrals(view(scene, method.rule, asked, sensor).tracer)
+    frames = list(costed([of] * FRAMES, asked, replicas, Live(rng)))
+    kept = [frames[0], *frames[FRAMES // 2 :]]
+    return {"images": np.stack([images for images, _ in kept]), "rays": np.array(frames[-1][1])}
+
+
+def costed(views: Sequence[Traced], asked: Counter[str], replicas: int, chance: Chance) -> list[tuple[Array, float]]:
+    """Every frame of the real-time preset, (replicas, n), with its rays per pixel."""
+    found, spent = [], rays(asked)
+    for of, images in zip(views, film(views, replicas, chance, sources=motion_vectors), strict=True):
+        found.append((images, (rays(asked) - spent) / (replicas * of.n) + MOTION_RAYS))
+        spent = rays(asked)
+    return found
+
+
+def motion_vectors(of: Traced, before: Traced) -> Array:
+    """The previous pixel of every pixel, (n,); its rays are charged by `costed`."""
+    t = of.tracer
+    uncounted = counted(t.scene, Counter())
+    return motion(uncounted, t.sensor, before.tracer.sensor).source  # type: ignore[arg-type]
+
+
+def widened(scene: str, sensor: Pinhole | None = None) -> list[Pinhole]:
+    """The sensors of a camera that arrives at the scene's inset unless told, MARGIN pixels wider on both sides."""
+    last = sensor or SCENES[scene]().pinhole()
+    return sideways(replace(last, n=last.n + 2 * MARGIN, first=last.first - MARGIN))
+
+
+def sideways(last: Pinhole) -> list[Pinhole]:
+    """The sensors of a camera that moves sideways by STEP per frame, FRAMES in all."""
+    forward = np.subtract(last.towards, last.eye) / np.linalg.norm(np.subtract(last.towards, last.eye))
+    side = STEP * np.array([forward[1], -forward[0]])
+    return [displaced(last, (k - FRAMES + 1) * side) for k in range(FRAMES)]
+
+
+def inset(images: Array) -> Array:
+    """The middle of wider images, (..., n)."""
+    return images[..., MARGIN:-MARGIN]
+
+
+def trees(scene: str, count: int, rng: np.random.Generator) -> Arrays:
+    """Independent images of one path tree per pixel, (count, n), and rays per tree."""
+    asked = Counter[str]()
+    found = estimates(path_tracing(1), view(scene, HYBRID, asked), asked, count, Live(rng))
+    return {"images": found.images, "rays": np.array(found.rays)}
+
+
+def at_equal_rays(trees: Arrays, rays_ours: float) -> Array:
+    """Means of as many path trees as cost at least so many rays, (groups, n)."""
+    return means(trees["images"], samples_of_equal_cost(rays_ours, float(trees["rays"])))
+
+
+def at_equal_time(trees: Arrays, scene: str) -> Array:
+    """Means of as many path trees as take the time of a frame, (groups, n)."""
+    return means(trees["images"], TREES_IN_A_FRAMES_TIME[scene])
+
+
+def paired(errors: Array, others: Array) -> tuple[Array, Array]:
+    """As many replicas of both."""
+    R = min(len(errors), len(others))
+    return errors[:R], others[:R]

@@ -1,0 +1,1 @@
+"""What people look at: the pictures' style, tables, and the page."""
