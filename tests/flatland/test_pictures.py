@@ -14,13 +14,8 @@ from flatland2d.fluence import direct, fluence, fluence_map
 from flatland2d.scenes import FURNACE_ALBEDO
 from flatland2d.tone import decoded, encoded, exposure, tone, untone
 from restir_ref.batch import take
-<<<<<<< HEAD
-from restir_ref.transport.paths import RECONNECTION, Tracer, leaves, radiance, trace
-from restir_ref.transport.proofs.inversion import traced
-=======
-from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Tracer, leaves, radiance, trace
->>>>>>> ten-notes
+from restir_ref.transport.proofs.inversion import traced
 from tests.core.stubs import live
 from tests.transport.paths import HYBRID, RULES
 
