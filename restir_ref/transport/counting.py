@@ -38,8 +38,9 @@ class Counted:
 
 
 def counted(scene: Scene, asked: Counter[str]) -> Scene:
-    """`scene`, counting into `asked`."""
-    return replace(scene, surfaces=Counted(scene.surfaces, asked))
+    """`scene`, counting into `asked`, and no longer into what it counted into before."""
+    plain = scene.surfaces.surfaces if isinstance(scene.surfaces, Counted) else scene.surfaces
+    return replace(scene, surfaces=Counted(plain, asked))
 
 
 def rays(asked: Counter[str]) -> int:
