@@ -99,7 +99,7 @@ TOY1D = {
     "line._kept_cells: ...line.holes({i, j => j, i}, z)...": "holes are symmetric in i and j",
 }
 
-THEORY = ("batch", "chance", "integrals", "guards", "loop", "gradient", "decorrelation", "metrics", "counting")
+THEORY = ("batch", "chance", "integrals", "guards", "loop", "images", "gradient", "decorrelation", "metrics", "counting")
 
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
@@ -124,6 +124,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         ),
         "toy1d": Group(("toy1d/*.py",), ("tests/core/test_*.py", "tests/toy1d/test_*.py"), equivalent=TOY1D),
         "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py",)),
+        "tracer3d": Group(("tracer3d/*.py",), ("tests/tracer3d/test_*.py",)),
     }
 )
 

@@ -1,0 +1,66 @@
+"""The judge of shifts acquits ours in every scene, by inset and by the whole view, and convicts planted mistakes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from restir_ref.chance import Live
+from restir_ref.transport.judge import Judgement, Shifting, judge, report
+from restir_ref.transport.paths import Tracer
+from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.transport.shift_checks import Effort
+from restir_ref.transport.shifts import shift_path
+from tests.tracer3d.views import RULES
+from tracer3d import SCENES
+
+SMALL = Effort(paths=1500, jacobians=30)
+
+
+def tracer(scene: str, rule: str, view: str) -> Tracer:
+    """A scene's inset, or all of it."""
+    setting = SCENES[scene]()
+    sensor = {"inset": setting.pinhole, "view": setting.view}[view](32, 32)
+    return Tracer(setting.scene, sensor, setting.depth, RULES[rule])
+
+
+def judged(of: PathIntegrals) -> Judgement:
+    return judge(of, Live(np.random.default_rng(1)), SMALL)
+
+
+@pytest.mark.claims("GRIS-A09", "GRIS-E35", "GRIS-E52", part="all scenes in 3D", world="tracer3d")
+@pytest.mark.parametrize("view", ["inset", "view"])
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_hybrid_shift_is_acquitted_in_every_scene(scene, view):
+    found = judged(PathIntegrals(tracer(scene, "hybrid", view)))
+    assert not found.red, report(found)
+
+
+@pytest.mark.parametrize("scene", ["cornell", "glossy_cornell", "glass_ball"])
+def test_so_is_reconnection(scene):
+    found = judged(PathIntegrals(tracer(scene, "reconnection", "inset")))
+    assert not found.red, report(found)
+
+
+def without_jacobian(t, x, pixel):
+    """A mistake: J = 1 wherever the shift is defined."""
+    y, J = shift_path(t, x, pixel)
+    return y, (J > 0).astype(float)
+
+
+def flat_jacobian(t, x, pixel):
+    """A mistake: the distances' ratio of flatland, to the first power."""
+    y, J = shift_path(t, x, pixel)
+    return y, np.sqrt(J)
+
+
+def unchecked(t, x, pixel):
+    """A mistake: paths that reconnect keep the base path's light."""
+    y, J = shift_path(t, x, pixel)
+    return replace(y, F=np.where(J > 0, x.F, y.F)), J
+
+
+@pytest.mark.parametrize("scene", ["cornell", "ajar"])
+@pytest.mark.parametrize("wrong", [without_jacobian, flat_jacobian, unchecked])
+def test_a_planted_mistake_is_convicted(wrong, scene):
+    assert judged(Shifting(tracer(scene, "hybrid", "inset"), wrong)).red
