@@ -99,7 +99,18 @@ TOY1D = {
     "line._kept_cells: ...line.holes({i, j => j, i}, z)...": "holes are symmetric in i and j",
 }
 
-THEORY = ("batch", "chance", "integrals", "guards", "loop", "images", "gradient", "decorrelation", "metrics", "counting")
+THEORY = (
+    "batch",
+    "chance",
+    "integrals",
+    "guards",
+    "loop",
+    "images",
+    "gradient",
+    "decorrelation",
+    "metrics",
+    "counting",
+)
 
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {

@@ -3,7 +3,7 @@
 What `loop` does in a row of pixels; here distances are those of the plane.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -102,7 +102,7 @@ def _rings(steps: Array, count: int) -> list[Array]:
     return [ring[:, np.argsort(np.arctan2(ring[0], ring[1]), kind="stable")] for ring in rings]
 
 
-def _first_alike(alike: Alike, of: Image, index: Array, tried: list[Pixels]) -> Pixels:
+def _first_alike(alike: Alike, of: Image, index: Array, tried: Sequence[Pixels]) -> Pixels:
     """The first of the neighbours tried that sees alike, else the pixel itself."""
     found = index
     for near in reversed(tried):

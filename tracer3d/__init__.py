@@ -1,4 +1,4 @@
-"""Three dimensions: triangles and spheres, a pinhole whose images are crops of a film, on transport of any dimension."""
+"""Three dimensions: triangles and spheres, a pinhole whose images are crops of a film, on the general transport."""
 
 from tracer3d.scenes import SCENES, setting
 from tracer3d.sensors import Pinhole, check_view

@@ -22,12 +22,15 @@ INSET = 64
 """Columns and rows of the standard inset."""
 
 
+PACE = 2.5, 0.5
+"""Pixels of the film, to the right and up, by which a moving camera slides from frame to frame."""
+
+
 @dataclass(frozen=True, eq=False)
 class Setting:
     """A scene with the place to look from, and the inset that shows why it matters.
 
     crop  column and row of the film at which the inset begins;  half  tangent of half the film's field of view
-    step  the way of eye and target from frame to frame, where the camera moves
     Raises ValueError for a depth that is no whole number >= 1, and for an eye in a solid or one that sees nothing.
     """
 
@@ -38,7 +41,6 @@ class Setting:
     depth: int = 4
     half: float = 0.8
     up: Point = UP
-    step: Point = (0.004, 0.0005, 0.001)
 
     def __post_init__(self) -> None:
         whole(self.depth, 1, "the path depth", "It counts scattering vertices; 1 is direct light.")
@@ -58,14 +60,12 @@ class Setting:
         return Pinhole(self.eye, self.towards, width, height, half, film=(width, height), up=self.up)
 
     def at(self, frame: float) -> "Setting":
-        """The setting seen by a moving camera: eye and target are `frame` steps further."""
-        eye, towards = (_moved(point, self.step, frame) for point in (self.eye, self.towards))
+        """The setting seen by a moving camera: it slides by PACE pixels per frame, measured where the target is."""
+        _, right, up = self.pinhole().axes()
+        pixel = 2 * self.half / FILM[0] * np.linalg.norm(np.subtract(self.towards, self.eye))
+        x, y, z = (frame * pixel * (PACE[0] * right + PACE[1] * up))[:, 0].tolist()
+        eye, towards = ((p[0] + x, p[1] + y, p[2] + z) for p in (self.eye, self.towards))
         return replace(self, eye=eye, towards=towards)
-
-
-def _moved(point: Point, step: Point, frame: float) -> Point:
-    x, y, z = (p + frame * s for p, s in zip(point, step, strict=True))
-    return x, y, z
 
 
 # ---------------------------------------------------------------- materials
@@ -102,15 +102,11 @@ def cornell_box(materials: Sequence[Material]) -> Setting:
     low = block(turned(rectangle((0.51, 0.55), (0.81, 0.85), 0.0), -17), 0.3, 3)
     shell = [*joined([floor, ceiling, back], 0), *quad(left, 1), *quad(right, 2)]
     facets = [*shell, *tall, *low, *lamp((0.38, 0.4), (0.62, 0.6), 0.995, 12.0)]
-    return Setting(
-        scene(SOLID, materials, facets), (0.5, 0.5, 2.4), (0.5, 0.5, 0.0), CORNELL_INSET, half=0.64, step=CORNELL_STEP
-    )
+    return Setting(scene(SOLID, materials, facets), (0.5, 0.5, 2.4), (0.5, 0.5, 0.0), CORNELL_INSET, half=0.64)
 
 
 CORNELL_INSET = 928, 668
 """The inset with an upright edge of the low box, the tall one behind it, and the floor before both."""
-
-CORNELL_STEP = (0.002, 0.0005, 0.001)
 
 
 def cornell(roughness: float = 0.5) -> Setting:
@@ -143,7 +139,7 @@ def two_rooms(gap: float = 0.06) -> Scene:
     if not 0 < gap < 0.5:
         raise ValueError(f"the gap of the door must be in (0, 0.5), but is {gap}.")
     parts = [((0.0, 0.0), (1.0, 0.5)), ((0.0, 0.5 + gap), (1.0, 1.0)), ((0.9, 0.5), (1.0, 0.5 + gap))]
-    wall = [[(1.0, y, z), (1.0, Y, z), (1.0, Y, Z), (1.0, y, Z)] for (y, z), (Y, Z) in parts]
+    wall = [[(1.0, y, z), (1.0, y, Z), (1.0, Y, Z), (1.0, Y, z)] for (y, z), (Y, Z) in parts]
     facets = [*room(0, 2.0), *joined(wall, 0), *lamp((1.5, 0.3), (1.9, 0.7), 0.995, 30.0)]
     return scene(SOLID, [matte(grey(0.75))], facets)
 
@@ -155,7 +151,7 @@ def ajar(gap: float = 0.06) -> Setting:
 
 def ajar_ceiling() -> Setting:
     """Ajar3 from below: light through the slit fans out over the ceiling."""
-    return Setting(two_rooms(), (0.5, 0.25, 0.5), (0.6, 1.0, 0.5), (960, 508), up=(0.0, 0.0, -1.0))
+    return Setting(two_rooms(), (0.5, 0.25, 0.5), (0.6, 1.0, 0.5), (936, 516), up=(0.0, 0.0, 1.0))
 
 
 def checker() -> Setting:
@@ -165,14 +161,12 @@ def checker() -> Setting:
         facet
         for i in range(n)
         for j in range(n)
-        for facet in quad(
-            rectangle((i / n, j / n), ((i + 1) / n, (j + 1) / n), step * (i >= n // 2)), (i + j) % 2
-        )
+        for facet in quad(rectangle((i / n, j / n), ((i + 1) / n, (j + 1) / n), step * (i >= n // 2)), (i + j) % 2)
     ]
     riser = quad([(0.5, 0.0, 0.0), (0.5, 0.0, 1.0), (0.5, step, 1.0), (0.5, step, 0.0)], 2)
     facets = [*tiles, *riser, *joined(walls()[1:], 2), *lamp((0.1, 0.1), (0.9, 0.9), 0.99, 3.0)]
     materials = [matte(grey(0.8)), matte(grey(0.2)), matte(grey(0.5))]
-    return Setting(scene(SOLID, materials, facets), (0.4, 0.8, 0.85), (0.5, 0.0, 0.45), (928, 508), step=(0.004, 0, 0))
+    return Setting(scene(SOLID, materials, facets), (0.4, 0.8, 0.85), (0.5, 0.0, 0.45), (928, 508))
 
 
 def crease() -> Setting:
@@ -195,8 +189,8 @@ def glass_ball() -> Setting:
     """GlassBall3: a ball of glass that hangs low over the floor: a contact caustic."""
     glass = [Layer("glass reflection", grey(1.0), 0.0), Layer("glass transmission", grey(1.0), 0.0)]
     facets = [*room(0), *lamp((0.44, 0.44), (0.56, 0.56), 0.99, 40.0)]
-    inside = scene(SOLID, [matte(grey(0.6)), Material(glass, eta=1.5)], facets, [Ball((0.5, 0.25, 0.5), 0.2, 1)])
-    return Setting(inside, (0.5, 0.55, 0.98), (0.5, 0.15, 0.4), (928, 600), depth=5)
+    inside = scene(SOLID, [matte(grey(0.6)), Material(glass, eta=1.5)], facets, [Ball((0.5, 0.25, 0.5), 0.14, 1)])
+    return Setting(inside, (0.5, 0.45, 0.95), (0.5, 0.1, 0.4), (928, 774), depth=5)
 
 
 def many_lights() -> Setting:
@@ -209,7 +203,7 @@ def many_lights() -> Setting:
     slats = [rectangle((x, 0.0), (x + 0.05, 1.0), 0.8) for x in np.linspace(0.05, 0.9, 9)]
     facets = [*room(0), *lamps, *joined(slats, 1), *box(rectangle((0.4, 0.4), (0.6, 0.6), 0.001), 0.2, 1)]
     materials = [matte(grey(0.5)), matte(grey(0.3))]
-    return Setting(scene(SOLID, materials, facets), (0.5, 0.6, 0.95), (0.5, 0.1, 0.4), (880, 600))
+    return Setting(scene(SOLID, materials, facets), (0.5, 0.6, 0.95), (0.5, 0.1, 0.4), (720, 640))
 
 
 SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(

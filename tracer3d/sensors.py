@@ -75,7 +75,7 @@ class Pinhole:
 
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A ray through the pixel; box filter, weight 1."""
-        forward, right, up = self._axes()
+        forward, right, up = self.axes()
         columns, rows = self.film
         s = (2 * (self.left + pixel % self.width + u[0]) / columns - 1) * self.half
         t = (rows - 2 * (self.top + pixel // self.width + u[1])) / columns * self.half
@@ -84,17 +84,15 @@ class Pinhole:
 
     def project(self, x: Array) -> Array:
         """Where points (3, N) are on the crop, column and row, also beyond its borders; inf behind the eye; (2, N)."""
-        forward, right, up = self._axes()
+        forward, right, up = self.axes()
         columns, rows = self.film
         to = x - np.array(self.eye, dtype=float)[:, None]
         depth = dot(forward, to)
         scale = columns / 2 / self.half / np.where(depth > 0, depth, 1)
-        place = np.stack(
-            [dot(right, to) * scale + columns / 2 - self.left, rows / 2 - dot(up, to) * scale - self.top]
-        )
+        place = np.stack([dot(right, to) * scale + columns / 2 - self.left, rows / 2 - dot(up, to) * scale - self.top])
         return np.where(depth > 0, place, np.inf)
 
-    def _axes(self) -> tuple[Array, Array, Array]:
+    def axes(self) -> tuple[Array, Array, Array]:
         """Forward, to the right and up, (3, 1) each."""
         forward = normalize(np.subtract(self.towards, self.eye, dtype=float)[:, None])
         right = normalize(np.cross(forward, np.array(self.up, dtype=float)[:, None], axis=0))

@@ -23,7 +23,7 @@ def quad(corners: Sequence[Sequence[float]], material: int, emission: Sequence[f
 
 
 def sides(low: Sequence[Point], high: Sequence[Point]) -> list[list[Point]]:
-    """Corners of a quad on every side of the closed polygon `low`, up to `high`; counterclockwise ones face outwards."""
+    """A quad on every side of the polygon `low`, up to `high`; fronts outside if it is counterclockwise."""
     return [[*each] for each in zip(low, [*low[1:], low[0]], [*high[1:], high[0]], high, strict=True)]
 
 

@@ -62,7 +62,9 @@ def test_neighbours_are_all_pixels_of_the_disk_but_never_the_pixel_itself(choice
 
 def unevenness(choice) -> float:
     """Largest |z| of the counts of 80 steps against equally likely ones."""
-    counts = Counter(zip(*steps(choice(SHAPE), SHAPE, 4, 5, np.full(50_000, MIDDLE)).reshape(2, -1).tolist(), strict=True))
+    counts = Counter(
+        zip(*steps(choice(SHAPE), SHAPE, 4, 5, np.full(50_000, MIDDLE)).reshape(2, -1).tolist(), strict=True)
+    )
     expected = 200_000 / 80
     return max(abs(counts[each] - expected) for each in points_within(5)) / np.sqrt(expected)
 
@@ -185,13 +187,13 @@ def test_random_neighbours_do_not_see_alike():
     assert not stripes(60)(pixel, near(random_in_disk(SHAPE), SHAPE, 3, 6, pixel)).all()
 
 
-def test_spread_neighbours_that_see_alike_are_as_far_away_as_others():
+def test_spread_neighbours_that_see_alike_are_about_as_far_away_as_others():
     pixel = np.full(3000, MIDDLE)
     far = [
         np.hypot(*steps(around, SHAPE, 6, 10, pixel)).mean()
         for around in (spread_in_disk(SHAPE), alike_among(stripes(60), spread_in_disk(SHAPE)))
     ]
-    assert far[1] == pytest.approx(far[0], rel=0.05)
+    assert far[1] == pytest.approx(far[0], rel=0.1)
 
 
 # ---------------------------------------------------------------- tiles

@@ -14,7 +14,9 @@ from restir_ref.transport.shifts import shift_path
 from tests.tracer3d.views import RULES
 from tracer3d import SCENES
 
-SMALL = Effort(paths=1500, jacobians=30)
+SMALL, MORE, MOST = (Effort(paths=paths, jacobians=20) for paths in (4000, 16_000, 50_000))
+EFFORTS = {"glossy_cornell": MORE, "ajar": MOST, "ajar_ceiling": MOST}
+"""Where few paths carry light: fewer would leave the judge undecided, which is no acquittal."""
 
 
 def tracer(scene: str, rule: str, view: str) -> Tracer:
@@ -24,21 +26,21 @@ def tracer(scene: str, rule: str, view: str) -> Tracer:
     return Tracer(setting.scene, sensor, setting.depth, RULES[rule])
 
 
-def judged(of: PathIntegrals) -> Judgement:
-    return judge(of, Live(np.random.default_rng(1)), SMALL)
+def judged(of: PathIntegrals, effort: Effort = SMALL) -> Judgement:
+    return judge(of, Live(np.random.default_rng(1)), effort)
 
 
 @pytest.mark.claims("GRIS-A09", "GRIS-E35", "GRIS-E52", part="all scenes in 3D", world="tracer3d")
 @pytest.mark.parametrize("view", ["inset", "view"])
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_hybrid_shift_is_acquitted_in_every_scene(scene, view):
-    found = judged(PathIntegrals(tracer(scene, "hybrid", view)))
+    found = judged(PathIntegrals(tracer(scene, "hybrid", view)), EFFORTS.get(scene, SMALL))
     assert not found.red, report(found)
 
 
 @pytest.mark.parametrize("scene", ["cornell", "glossy_cornell", "glass_ball"])
 def test_so_is_reconnection(scene):
-    found = judged(PathIntegrals(tracer(scene, "reconnection", "inset")))
+    found = judged(PathIntegrals(tracer(scene, "reconnection", "inset")), EFFORTS.get(scene, SMALL))
     assert not found.red, report(found)
 
 
@@ -60,7 +62,8 @@ def unchecked(t, x, pixel):
     return replace(y, F=np.where(J > 0, x.F, y.F)), J
 
 
-@pytest.mark.parametrize("scene", ["cornell", "ajar"])
+@pytest.mark.parametrize("scene", ["cornell", "crease"])
 @pytest.mark.parametrize("wrong", [without_jacobian, flat_jacobian, unchecked])
 def test_a_planted_mistake_is_convicted(wrong, scene):
-    assert judged(Shifting(tracer(scene, "hybrid", "inset"), wrong)).red
+    found = judged(Shifting(tracer(scene, "hybrid", "inset"), wrong))
+    assert {"finite differences", "traced from scratch"} & {*found.red}

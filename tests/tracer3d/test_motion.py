@@ -60,14 +60,16 @@ def test_disoccluded_is_what_the_previous_eye_did_not_see_or_the_crop_did_not_ho
 
 
 @every_scene
-def test_every_camera_moves_by_some_pixels_of_the_film_per_frame(scene):
+def test_every_camera_moves_by_two_to_four_pixels_of_the_film_per_frame(scene):
     setting = SCENES[scene]()
     now, before = (setting.at(frame).pinhole() for frame in (1, 0))
     m = motion(setting.scene, now, before)
     pixel = np.arange(now.n)
     far = np.hypot(*(m.place - np.stack([pixel % 64, pixel // 64]) - 0.5))[m.seen]
-    assert 1 < np.median(far) < 8
-    assert setting.at(3).eye == pytest.approx(setting.at(1).at(2).eye)
+    assert 1.5 < np.median(far) < 5
+    for moved in (setting.at(3), setting.at(1).at(2)):
+        assert np.subtract(moved.eye, setting.eye) == pytest.approx(3 * np.subtract(now.eye, setting.eye))
+        assert np.subtract(moved.towards, moved.eye) == pytest.approx(np.subtract(setting.towards, setting.eye))
 
 
 def sliding(columns: float, rows: float, size: int = 16) -> Motion:

@@ -137,10 +137,13 @@ FOR_PIXELS = {
 }
 FOR_SETTINGS = {
     "an eye in a box": Mistake(
-        lambda: replace(HOME, eye=(0.34, 0.3, 0.37), towards=(0.34, 0.3, 0.0)), ValueError, "eye=(0.34, 0.3, 0.37)", "Move it"
+        lambda: replace(HOME, eye=(0.34, 0.3, 0.37), towards=(0.34, 0.3, 0.0)),
+        ValueError,
+        "eye=(0.34, 0.3, 0.37)",
+        "Move it",
     ),
     "an eye behind the back wall": Mistake(
-        lambda: replace(HOME, eye=(0.5, 0.5, -1.0)), ValueError, "eye=(0.5, 0.5, -1.0)", "turn the facets round"
+        lambda: replace(HOME, eye=(0.4, 0.6, -1.0)), ValueError, "eye=(0.4, 0.6, -1.0)", "turn the facets round"
     ),
     "an eye that looks away": Mistake(
         lambda: replace(HOME, towards=(0.5, 0.5, 9.0)), ValueError, "towards=(0.5, 0.5, 9.0)", "looks past everything"

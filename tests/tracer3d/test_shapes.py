@@ -1,4 +1,4 @@
-"""Shapes are closed and face the right way: the volume that their triangles enclose, signed by their fronts, is known."""
+"""Shapes are closed and face the right way: the volume their triangles enclose, signed by fronts, is known."""
 
 from dataclasses import replace
 
@@ -19,7 +19,9 @@ def volume(facets: list[Facet]) -> float:
 def area(facets: list[Facet]) -> float:
     """Sum of areas."""
     corners = np.array([each.corners for each in facets])
-    return float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2)
+    return float(
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    )
 
 
 def test_boxes_face_outwards_and_rooms_inwards():
@@ -51,7 +53,14 @@ def test_turning_is_counterclockwise_seen_from_above_about_the_middle():
 
 def test_the_walls_of_a_room_are_where_they_are_said_to_be():
     floor, ceiling, left, front, right, back = (np.array(each) for each in walls(2.0))
-    for corners, axis, place in ((floor, 1, 0), (ceiling, 1, 1), (left, 0, 0), (right, 0, 2), (front, 2, 1), (back, 2, 0)):
+    for corners, axis, place in (
+        (floor, 1, 0),
+        (ceiling, 1, 1),
+        (left, 0, 0),
+        (right, 0, 2),
+        (front, 2, 1),
+        (back, 2, 0),
+    ):
         assert (corners[:, axis] == place).all()
 
 

@@ -1,4 +1,4 @@
-"""The inverses that the protocol does not ask for; the others, and that samplers are uniform, stand in tests/transport."""
+"""The inverses that the protocol does not ask for; those it asks for, and uniformity, are in tests/transport."""
 
 from dataclasses import dataclass
 

@@ -22,7 +22,11 @@ def tracer(scene: str, rule: Connectability = HYBRID, size: int = 32) -> Tracer:
 
 def directed(eye: Array, towards: Array) -> Pinhole:
     """One pixel that sees one point."""
-    up = (0.0, 0.0, -1.0) if abs(towards[1] - eye[1]) > 0.99 * np.linalg.norm(np.subtract(towards, eye)) else (0.0, 1.0, 0.0)
+    up = (
+        (0.0, 0.0, -1.0)
+        if abs(towards[1] - eye[1]) > 0.99 * np.linalg.norm(np.subtract(towards, eye))
+        else (0.0, 1.0, 0.0)
+    )
     return Pinhole(tuple(eye), tuple(towards), 1, 1, AT_A_POINT, film=(1, 1), up=up)
 
 
