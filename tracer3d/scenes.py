@@ -146,7 +146,7 @@ def two_rooms(gap: float = 0.06) -> Scene:
 
 def ajar(gap: float = 0.06) -> Setting:
     """Ajar3: two rooms joined by a slit, the light in the other one: rare, valuable paths."""
-    return Setting(two_rooms(gap), (0.08, 0.6, 0.92), (0.9, 0.3, 0.3), (1100, 560))
+    return Setting(two_rooms(gap), (0.08, 0.6, 0.92), (0.9, 0.3, 0.3), (1110, 830))
 
 
 def ajar_ceiling() -> Setting:
