@@ -1,8 +1,9 @@
 """From a scene to a picture: frames of a method, their mean, and where an earlier run has stopped."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from types import MappingProxyType
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from tracer3d.methods import METHODS, PRESETS, Shot
 from tracer3d.scenes import Setting, setting
 from tracer3d.sensors import Pinhole
 
-BYTES = 24_000
-"""Memory of a pixel whose samples are resampled, measured on `cornell` at depth 4."""
+BYTES: Mapping[str, int] = MappingProxyType({"realtime": 12_000, "offline": 18_000})
+"""Memory per pixel of methods that hold a whole frame, by preset: the most that was measured on `cornell`."""
 
 MOST = 4 * 2**30
 """Bytes that a picture may need."""
@@ -48,7 +49,7 @@ class Job:
         named(PRESETS, self.preset, "preset")
         for count in self.size:
             whole(count, 1, "each side of a picture", "Say --size 64x64.")
-        needed = self.size[0] * self.size[1] * BYTES
+        needed = self.size[0] * self.size[1] * BYTES[self.preset]
         if self.method != "path" and needed > MOST:
             raise ValueError(
                 f"a picture of {self.size[0]} x {self.size[1]} pixels by {self.method} needs about "
@@ -60,8 +61,8 @@ class Job:
 
     def setting(self, frame: float) -> Setting:
         """The scene as the camera of a frame sees it."""
-        at = _compiled(self.scene)
-        return (at if self.depth is None else replace(at, depth=self.depth)).at(frame * self.moving)
+        at, steps = _begun(self.scene, self.depth), frame * self.moving
+        return at.at(steps) if steps else at
 
     def sensor(self, frame: float) -> Pinhole:
         """The camera of a frame."""
@@ -73,7 +74,10 @@ class Job:
         return Tracer(scene, self.sensor(frame), self.setting(frame).depth, METHODS[self.method].rule)
 
 
-_compiled = cache(setting)
+@cache
+def _begun(scene: str, depth: int | None) -> Setting:
+    at = setting(scene)
+    return at if depth is None else replace(at, depth=depth)
 
 
 @dataclass(frozen=True, eq=False)
