@@ -11,7 +11,7 @@ from restir_ref.chance import Live
 from restir_ref.transport.counting import counted
 from tests.tracer3d.views import mean_and_error
 from tracer3d import compare, files
-from tracer3d.methods import METHODS
+from tracer3d.methods import METHODS, PRESETS, traced
 from tracer3d.render import Job, Picture, blank, render
 
 SMALL = Job("matte_cornell", "path", size=(8, 8), crop=(928, 668), depth=3)
@@ -31,18 +31,20 @@ def image_means(job: Job, chains: int, frames: int) -> np.ndarray:
     return np.array([pictures(job, frames, seed=k)[-1].mean.mean() for k in range(chains)])
 
 
-LARGER = replace(SMALL, size=(24, 24))
+LARGER = replace(SMALL, size=(20, 20))
 
 
 @cache
 def path_traced() -> np.ndarray:
-    """The same by path tracing."""
-    return image_means(LARGER, 8, 16)
+    """Means of 16 independent images by path tracing, of 8 trees per pixel."""
+    t = LARGER.tracer(0, LARGER.setting(0).scene)
+    L = traced(t, np.tile(np.arange(t.sensor.n), 128), Live(np.random.default_rng(9)))
+    return np.asarray(L.mean(axis=0).reshape(16, -1).mean(axis=1))
 
 
 def change(method: str, wrong: float = 1.0) -> tuple[float, float]:
     """z of a method's mean against path tracing, and its standard error relative to it."""
-    found, truth = wrong * image_means(replace(LARGER, method=method), 8, 2), path_traced()
+    found, truth = wrong * image_means(replace(LARGER, method=method), 6, 2), path_traced()
     (a, error_a), (b, error_b) = mean_and_error(found), mean_and_error(truth)
     error = np.hypot(error_a, error_b)
     return (a - b) / error, error / b
@@ -51,7 +53,7 @@ def change(method: str, wrong: float = 1.0) -> tuple[float, float]:
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "path"])
 def test_every_method_has_the_mean_of_path_tracing_where_all_is_matte(method):
     z, error = change(method)
-    assert error < 0.025
+    assert error < 0.03
     assert abs(z) < 4
 
 
@@ -68,16 +70,15 @@ def test_pictures_of_a_still_camera_are_means_and_of_a_moving_one_last_frames():
     assert len(last) == 1
 
 
-@pytest.mark.parametrize("method", ["path", "path-reuse"])
-def test_an_ended_run_goes_on_to_the_same_bytes(method):
-    job = replace(SMALL, method=method)
-    whole = pictures(job, 4)[-1]
-    ended = pictures(job, 2)[-1]
-    assert (pictures(job, 4, ended)[-1].sum == whole.sum).all()
-    assert not (pictures(job, 4, ended, seed=2)[-1].sum == whole.sum).all()
+def test_an_ended_run_goes_on_to_the_same_bytes():
+    whole, ended = pictures(SMALL, 4)[-1], pictures(SMALL, 2)[-1]
+    assert (pictures(SMALL, 4, ended)[-1].sum == whole.sum).all()
+    assert not (pictures(SMALL, 4, ended, seed=2)[-1].sum == whole.sum).all()
 
 
-def test_offline_frames_know_nothing_of_each_other():
+def test_offline_frames_know_nothing_of_each_other(monkeypatch):
+    cheaper = {name: replace(preset, trees=2, neighbours=1, radius=2) for name, preset in PRESETS.items()}
+    monkeypatch.setattr("tracer3d.render.PRESETS", cheaper)
     job = replace(SMALL, method="restir-pt", preset="offline", size=(4, 4))
     ended = pictures(job, 1)[-1]
     assert (pictures(job, 2, ended)[-1].sum == pictures(job, 2)[-1].sum).all()

@@ -106,7 +106,7 @@ def test_a_constant_jacobian_is_noticed():
 # ---------------------------------------------------------------- path reuse
 
 
-def reused(scene: str, order: Array, replicas: int = 64) -> tuple[Array, Array]:
+def reused(scene: str, order: Array, replicas: int = 16) -> tuple[Array, Array]:
     """Images by path reuse in tiles of 16 pixels of this order, and of the same trees without; (replicas, 16, 16)."""
     setting = SCENES[scene]()
     t = Tracer(setting.scene, setting.pinhole(SIZE, SIZE), setting.depth, RECONNECTION)
@@ -137,7 +137,7 @@ def test_tiles_that_are_rows_move_light_out_of_squares():
 
 @pytest.mark.claims("COM-B02", part="tiles of 4 x 4", world="tracer3d")
 def test_path_reuse_shows_its_tiles_and_changes_no_mean():
-    with_, without = reused("cornell", tiles((SIZE, SIZE)))
+    with_, without = reused("cornell", tiles((SIZE, SIZE)), 64)
     d = (with_ - without).mean(axis=(1, 2))
     mean, error = mean_and_error(d)
     assert error < 0.01 * without.mean()
