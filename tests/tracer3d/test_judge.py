@@ -49,7 +49,7 @@ IN_VIEWS = {name: check for name, check in CHECKS.items() if name != "finite dif
 def test_the_hybrid_shift_is_acquitted_in_every_scene(scene, view):
     found = judged(
         PathIntegrals(tracer(scene, "hybrid", view)),
-        EFFORTS.get((scene, "inset"), SMALL),
+        EFFORTS.get((scene, view), SMALL),
         {"inset": CHECKS, "view": IN_VIEWS}[view],
     )
     assert not found.red, report(found)
