@@ -30,8 +30,8 @@ def random_in_disk(shape: Shape) -> Around:
 
     def around(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
         steps = disk(radius)
-        chosen = np.floor(chance.uniform((count, len(index))) * steps.shape[1]).astype(int)
-        return [_moved(of, shape, index, steps.take(k, axis=-1)) for k in chosen]
+        chosen = (chance.uniform((count, len(index))) * steps.shape[1]).astype(int)
+        return [_moved(of, shape, index, steps[:, k]) for k in chosen]
 
     return around
 
@@ -48,7 +48,7 @@ def spread_in_disk(shape: Shape) -> Around:
         for k in range(count):
             ring = rings[k % len(rings)]
             turn = (start + k * GOLDEN) % 1
-            near.append(_moved(of, shape, index, ring.take((turn * ring.shape[1]).astype(int), axis=-1)))
+            near.append(_moved(of, shape, index, ring[:, (turn * ring.shape[1]).astype(int)]))
         return near
 
     return around
@@ -90,7 +90,7 @@ def disk(radius: float) -> Array:
             f"neighbours are 1 .. radius pixels away, but the radius is {radius}: take 1, or no neighbours."
         )
     reach = np.arange(-int(radius), int(radius) + 1)
-    steps = np.stack(np.meshgrid(reach, reach, indexing="ij")).reshape(2, -1)
+    steps = np.stack(np.meshgrid(reach, reach)).reshape(2, -1)
     far = (steps**2).sum(axis=0)
     order = np.argsort(far, kind="stable")
     return steps[:, order[(far[order] > 0) & (far[order] <= radius**2)]]

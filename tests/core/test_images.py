@@ -9,7 +9,8 @@ import pytest
 from restir_ref import images
 from restir_ref.batch import Array
 from restir_ref.images import alike_among, disk, random_in_disk, spread_in_disk, tiles
-from restir_ref.loop import Around, random_in_row
+from restir_ref.integrals import Pixels
+from restir_ref.loop import GOLDEN, Around, random_in_row
 from tests.core.stubs import live
 
 AROUND = {"random": random_in_disk, "spread": spread_in_disk}
@@ -48,6 +49,11 @@ def test_a_disk_holds_every_pixel_within_its_radius_once_and_the_nearest_first(r
     found = disk(radius)
     assert sorted(map(tuple, found.T.tolist())) == sorted(points_within(radius))
     assert (np.diff((found**2).sum(axis=0)) >= 0).all()
+
+
+@pytest.mark.parametrize("radius", [1.5, 10])
+def test_steps_are_whole_numbers(radius):
+    assert disk(radius).dtype.kind == "i"
 
 
 def test_the_papers_radii_hold_316_and_1256_pixels():
@@ -106,12 +112,17 @@ def mirrored(shape: tuple[int, int], radius: int, pixel: tuple[int, int]) -> Cou
     return Counter(number[pixel[0] + radius + a, pixel[1] + radius + b] for a, b in points_within(radius))
 
 
-@pytest.mark.parametrize("shape", [(5, 5), (3, 7), (8, 2)])
+@pytest.mark.parametrize("shape", [(5, 5), (3, 7), (8, 2), (1, 7)])
 def test_the_image_goes_on_in_mirrors_beyond_its_borders(shape):
     of, step = Image(shape[0] * shape[1]), disk(6)
     for pixel in range(of.n):
         found = images._moved(of, shape, np.full(step.shape[1], pixel), step).index
         assert Counter(found.tolist()) == mirrored(shape, 6, divmod(pixel, shape[1]))
+
+
+def test_steps_go_down_and_to_the_right():
+    found = images._moved(Image(2400), SHAPE, np.array([MIDDLE, 2400 + MIDDLE]), np.array([[1, -2], [3, 4]])).index  # type: ignore[arg-type]
+    assert found.tolist() == [MIDDLE + 60 + 3, 2400 + MIDDLE - 120 + 4]
 
 
 def test_wrapping_instead_of_mirroring_is_noticed(monkeypatch):
@@ -132,6 +143,15 @@ def clumping(choice) -> float:
 @pytest.mark.claims("GRIS-A08", part="neighbours in a disk", world="tracer3d")
 def test_spread_neighbours_are_further_from_each_other_than_random_ones():
     assert clumping(spread_in_disk) > 1.25 * clumping(random_in_disk)
+
+
+def test_spread_neighbours_are_one_in_each_of_rings_of_equal_size_and_golden_angles_apart():
+    rows, columns = steps(spread_in_disk(SHAPE), SHAPE, 6, 15, np.full(500, MIDDLE)).astype(float)
+    far2, borders = rows**2 + columns**2, np.linspace(0, 15**2, 7)
+    for ring, low, high in zip(far2, borders, borders[1:], strict=False):
+        assert low - 4 < ring.min() <= ring.max() < high + 4
+    turned = np.diff(np.arctan2(rows, columns), axis=0) / (2 * np.pi) % 1
+    assert turned == pytest.approx(GOLDEN, abs=0.05)
 
 
 @each_choice
@@ -167,6 +187,25 @@ def test_neighbours_that_see_alike_are_alike_or_the_pixel_itself(around, shape):
     found = near(alike_among(stripes(60), around), shape, 3, 6, pixel)
     assert stripes(60)(pixel, found).all()
     assert (found == pixel).mean() < 0.01 + 0.5**8
+
+
+def listed(*steps_):
+    """A choice that tries these steps in their order."""
+    return lambda of, index, count, radius, chance: [Pixels(of, index + step) for step in steps_]
+
+
+def test_it_is_the_first_of_those_tried_that_is_taken_and_replicas_look_at_the_same_g_buffer():
+    g_buffer = np.array([1, 0, 1, 1, 0, 0])
+    around = alike_among(lambda i, j: g_buffer[i] == g_buffer[j], listed(1, 2, 3, 4), 2)
+    first, second = around(Image(6), np.array([0, 6]), 2, 9, live())  # type: ignore[arg-type]
+    assert first.index.tolist() == [2, 8]
+    assert second.index.tolist() == [3, 9]
+
+
+def test_eight_are_tried_for_each():
+    """Three of four steps lead to the left, or back to the pixel itself."""
+    found = near(alike_among(lambda i, j: i < j, random_in_disk((1, 3))), (1, 3), 2, 1, np.ones(200_000, dtype=int))
+    assert (found == 1).mean(axis=1) == pytest.approx(0.75**8, rel=0.05)
 
 
 def test_in_a_row_they_are_drawn_by_the_same_function():
@@ -216,5 +255,8 @@ def test_rows_of_sixteen_pixels_are_no_tiles():
 def test_images_that_tiles_do_not_fill_are_refused():
     with pytest.raises(ValueError, match="8 x 10 pixels cannot be cut into tiles of 4 x 4"):
         tiles((8, 10))
+    with pytest.raises(ValueError, match="10 x 8 pixels"):
+        tiles((10, 8))
     with pytest.raises(ValueError, match="tiles of 0 x 0"):
         tiles((8, 8), 0)
+    assert (tiles((2, 3), 1) == np.arange(6)).all()
