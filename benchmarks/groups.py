@@ -76,6 +76,13 @@ OF_THEORY = {
         "a correlation is symmetric"
     ),
     "metrics._frequencies: ...{, sparse=True => }...": "the same numbers, in more memory",
+    "images.spread_in_disk.around: ...k {* => /} GOLDEN...": "1 / GOLDEN is 1 + GOLDEN, the same modulo 1",
+    "images.tiles: ...swapaxes({1, 2 => 2, 1})...": "swapping is symmetric",
+    "images.tiles: ...reshape(-{1 => 2})": "any negative number will do",
+    "images.disk: ...reshape(2, -{1 => 2})": "any negative number will do",
+    "images.disk: ...int(radius) + {1 => 2})": "what is beyond the radius is left out",
+    "images.disk: ...{, kind='stable' => })": "steps of one length in another order",
+    "images._rings: ...{, kind='stable' => })...": "steps of one angle in another order",
 }
 AUDIT = {
     "load._check_values: for name in ('{u', 'u_stream => u_stream', 'u}'):": "which of two mistakes is named first",
@@ -99,7 +106,18 @@ TOY1D = {
     "line._kept_cells: ...line.holes({i, j => j, i}, z)...": "holes are symmetric in i and j",
 }
 
-THEORY = ("batch", "chance", "integrals", "guards", "loop", "gradient", "decorrelation", "metrics", "counting")
+THEORY = (
+    "batch",
+    "chance",
+    "integrals",
+    "guards",
+    "loop",
+    "images",
+    "gradient",
+    "decorrelation",
+    "metrics",
+    "counting",
+)
 
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
@@ -124,6 +142,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         ),
         "toy1d": Group(("toy1d/*.py",), ("tests/core/test_*.py", "tests/toy1d/test_*.py"), equivalent=TOY1D),
         "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py",)),
+        "tracer3d": Group(("tracer3d/*.py",), ("tests/tracer3d/test_*.py",)),
     }
 )
 

@@ -216,12 +216,13 @@ def test_a_list_of_figures_is_noticed(tmp_path, path, name):
 
 # ---------------------------------------------------------------- chance
 
+DOORS = ("restir_ref.chance", "tracer3d.cli")
 DICE = re.compile(r"(?:(?:np|numpy)\.)?random\.(?!Generator$)\w+|(?:numpy\.)?random$")
 
 
 def own_dice(root: Path) -> list[str]:
-    """Uses of a random number generator below the figures; only `chance.py` is the door."""
-    below = [module for module in modules(root, (THEORY, *WORLDS)) if module.name != "restir_ref.chance"]
+    """Uses of a random number generator below the figures; only `chance.py` is the door, and commands bring a seed."""
+    below = [module for module in modules(root, (THEORY, *WORLDS)) if module.name not in DOORS]
     uses = ((module, use) for module in below for use in (*imported(module), *attributes(module)))
     return [f"{module.name} uses {use}" for module, use in uses if DICE.match(use)]
 
