@@ -142,7 +142,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         ),
         "toy1d": Group(("toy1d/*.py",), ("tests/core/test_*.py", "tests/toy1d/test_*.py"), equivalent=TOY1D),
         "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py",)),
-        "tracer3d": Group(("tracer3d/*.py",), ("tests/tracer3d/test_*.py",)),
+        "tracer3d": Group(("tracer3d/*.py",), ("tests/tracer3d/test_*.py", "tests/transport/test_spaces.py")),
     }
 )
 

@@ -6,12 +6,17 @@ from functools import cache
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from restir_ref.chance import Live
+from restir_ref.integrals import Pixels
+from restir_ref.restir import initial
 from restir_ref.transport.counting import counted
+from restir_ref.transport.restir_pt import PathIntegrals
 from tests.tracer3d.views import mean_and_error
 from tracer3d import compare, files
-from tracer3d.methods import METHODS, PRESETS, traced
+from tracer3d.methods import METHODS, PRESETS, Memory, Shot, recalled, traced
+from tracer3d.motion import motion
 from tracer3d.render import Job, Picture, blank, render
 
 SMALL = Job("matte_cornell", "path", size=(8, 8), crop=(928, 668), depth=3)
@@ -86,6 +91,16 @@ def test_offline_frames_know_nothing_of_each_other(monkeypatch):
     assert (pictures(realtime, 2, pictures(realtime, 1)[-1])[-1].sum != pictures(realtime, 2)[-1].sum).any()
 
 
+def test_history_comes_from_where_the_previous_camera_saw_the_point():
+    now, before = (Shot(replace(SMALL, moving=1.0).tracer(k, SMALL.setting(0).scene), chances(1)(k)) for k in (4, 0))
+    here = Pixels(PathIntegrals(before.tracer), before.pixels)
+    _, found = recalled(Memory(before, here, initial(here, before.chance)), now)
+    m = motion(now.tracer.scene, now.tracer.sensor, before.tracer.sensor)
+    assert (found[0].index == m.source).all()
+    assert (found[0].index != now.pixels).any()
+    assert recalled(None, now) == (None, [])
+
+
 # ---------------------------------------------------------------- files
 
 L = np.random.default_rng(1).random((3, 4, 6)).astype(np.float32).astype(float)
@@ -117,8 +132,14 @@ def test_what_is_no_pfm_is_refused_by_name(tmp_path, data, said):
 
 def test_tones_are_the_standard_s_and_clipped():
     assert files.tone(np.array([0.0, 0.5, 1.0, 9.0]), 1.0) == pytest.approx([0, 0.7354, 1, 1], abs=1e-4)
+    assert files.tone(np.array(0.002), 1.0) == pytest.approx(12.92 * 0.002)
     assert files.exposure(np.zeros(4)) == 1
     assert files.exposure(np.array([0.0, 2.0])) == pytest.approx(0.4)
+
+
+def test_white_is_white_and_grey_pictures_have_equal_channels(tmp_path):
+    files.write_shown(tmp_path / "w.png", np.array([[[1.0, 0.5]]]))
+    assert imread(tmp_path / "w.png")[0, :, :3] == pytest.approx(np.array([[1.0] * 3, [128 / 255] * 3]))
 
 
 def test_a_saved_run_is_loaded_and_other_settings_are_refused(tmp_path):

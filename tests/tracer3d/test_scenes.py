@@ -1,5 +1,8 @@
 """Every scene is what its docstring says: closed or open, lamps, slit, step, ball, colours, and what is seen."""
 
+from dataclasses import replace
+from hashlib import sha256
+
 import numpy as np
 import pytest
 
@@ -197,3 +200,54 @@ def test_lamps_shine_in_white_and_in_three_channels(name):
     emission = SCENES[name]().scene.lights.emission
     assert len(emission) == 3
     assert (emission == emission[0]).all()
+
+
+# ---------------------------------------------------------------- unchanged
+
+
+def digest(name: str) -> str:
+    """Eight hex digits of everything a scene is made of, to nine decimals."""
+    at = SCENES[name]()
+    s, m = at.scene, at.scene.materials
+    view = [*at.eye, *at.towards, *at.up, *at.crop, at.depth, at.half]
+    parts = (
+        s.corners,
+        s.emission,
+        s.material,
+        s.centres,
+        s.radii,
+        m.kind,
+        m.roughness,
+        m.colour,
+        m.weight,
+        m.eta,
+        view,
+    )
+    return sha256(b"".join((np.round(part, 9) + 0.0).tobytes() for part in map(np.float64, parts))).hexdigest()[:8]
+
+
+DIGESTS = {
+    "cornell": "9031b214",
+    "glossy_cornell": "7e9c6d38",
+    "matte_cornell": "5dc85b28",
+    "ajar": "d50c2355",
+    "ajar_ceiling": "7790f1b7",
+    "checker": "ee0592e9",
+    "crease": "4351fe54",
+    "furnace": "69abb2f5",
+    "glass_ball": "ad1c39d9",
+    "many_lights": "6d5118d1",
+}
+"""Whoever changes a scene on purpose changes its digest, and makes its references and results anew."""
+
+
+@every_scene
+def test_a_scene_changes_on_purpose_only(name):
+    assert digest(name) == DIGESTS[name]
+
+
+def test_a_lamp_a_hair_brighter_is_noticed(monkeypatch):
+    right = SCENES["ajar"]()
+    brighter = replace(right.scene, emission=right.scene.emission * 1.0001)
+    monkeypatch.setattr("tests.tracer3d.test_scenes.SCENES", {"ajar": lambda: replace(right, scene=brighter)})
+    assert digest("ajar") != DIGESTS["ajar"]

@@ -10,7 +10,7 @@ from tests.core.test_bad_input import Mistake, faults
 from tests.tracer3d.views import AT_A_POINT, directed
 from tracer3d import SCENES, Pinhole, check_view, setting
 from tracer3d.scenes import Setting, two_rooms
-from tracer3d.sensors import FILM
+from tracer3d.sensors import FILM, facing
 
 NAN, INF = np.nan, np.inf
 CAMERA = Pinhole((0.3, 0.6, 1.5), (0.9, 0.1, 0.2), 50, 30, 0.8, left=700, top=400)
@@ -103,6 +103,13 @@ def test_a_pinhole_of_one_point_sees_that_point():
     _, w, _ = directed((0.5, 0.9, 0.5), (0.5, 0.0, 0.5)).ray(np.array([0]), np.array([[0.9], [0.1]]))
     assert w[:, 0] == pytest.approx([0, -1, 0], abs=2 * AT_A_POINT)
     assert s.extent == 1
+
+
+def test_facing_tells_fronts_backs_and_nothing_apart():
+    s = SCENES["cornell"]().scene
+    eyes = {1: (0.5, 0.5, 2.0), -1: (0.5, 0.5, -1.0), 0: (0.5, 0.5, 9.0)}
+    for found, eye in eyes.items():
+        assert facing(s, directed(eye, (0.5, 0.5, 10.0 if found == 0 else 0.0))) == [found]
 
 
 # ---------------------------------------------------------------- complaints
