@@ -86,6 +86,7 @@ def draw(a: Arrays) -> "Picture":
         )
     errors.set(xlabel="relMSE of the mean of one run", ylabel="share of runs below", title="All runs")
     errors.set_yscale("linear")
+    errors.tick_params(axis="x", which="minor", labelbottom=False)
     style.below(errors)
     return picture
 
