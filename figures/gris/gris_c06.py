@@ -185,7 +185,7 @@ def _correlated(k: int, a: Arrays) -> Claim:
 
 def draw(a: Arrays) -> "Picture":
     """Correlation over lag, spread of the mean over frames, distribution of samples."""
-    picture, axes = style.panels(1, 3, width=3.7, height=3.0)
+    picture, axes = style.panels(1, 3, width=3.7, height=3.5)
     lags, means, shares = axes[0]
     for k, cap in enumerate(CAPS):
         name = style.cap(cap)
@@ -213,7 +213,7 @@ def draw(a: Arrays) -> "Picture":
         xlabel="$F_i(Y)$, uniform for $Y \\sim f_i / ||f_i||$", ylabel="density", title="64-pixel image, $M_c = 20$"
     )
     shares.set_ylim(0.5, 1.7)
-    shares.legend()
+    style.below(shares, ncols=1)
     return picture
 
 
