@@ -191,7 +191,7 @@ def test_the_scale_of_a_map_is_in_fluence():
     assert "rad" in bar.ax.get_ylabel()
 
 
-def test_a_map_shows_more_than_half_of_its_tones():
+def test_the_middle_of_a_map_takes_a_third_of_its_tones():
     values = fluence_map(SCENES["occluders"](), 12, 12, 8, live())
     low, high = pictures.fluence_limits(values)
     tones = np.log(np.clip(values, low, high) / low) / np.log(high / low)
