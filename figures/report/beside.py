@@ -79,5 +79,5 @@ def chain(claim: str, beside: Beside) -> str:
         for name, links in (("Code that cites it", code), ("Tests that show it", tests))
         if links
     ]
-    counts = f"{len(code)} places in code, {len(tests)} tests"
+    counts = f"code: {len(code)}, tests: {len(tests)}"
     return f'<details class="chain"><summary>{counts}</summary>{"".join(lists)}</details>'

@@ -7,12 +7,12 @@ from html import escape
 from typing import Any
 
 from figures.claims.criteria import show
-from figures.claims.figure import VERDICTS, Verdict, words
+from figures.claims.figure import Verdict, words
 from figures.claims.verdicts import Judged
 from figures.engine.gather import Shown
 from figures.report.beside import Beside
 from figures.report.glossary import PAPERS
-from figures.report.markup import OTHERWISE, SYMBOLS, badge, kind, link, listed, paper, place_of, sentences, word
+from figures.report.markup import OTHERWISE, SYMBOLS, kind, link, listed, paper, place_of, sentences, word
 
 WHAT = (
     "restir-ref computes the figures of four papers on ReSTIR (reservoir-based spatiotemporal importance resampling) "
@@ -22,7 +22,9 @@ WHAT = (
     "Claims no figure is about are shown by tests, and the <a href='#all-claims'>table of all claims</a> tells which."
 )
 TESTS, NOTHING = "by tests alone", "not yet"
-MARKS = {**SYMBOLS, TESTS: "t", NOTHING: "–"}
+ORDER = ("reproduced", "reproduced with caveat", "not reproduced", "refuted", "reported", "not judged", TESTS, NOTHING)
+"""From left to right in a bar."""
+MARKS: dict[str, str] = {**SYMBOLS, TESTS: "t", NOTHING: "–"}
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ def counts(judged: Sequence[Judged], beside: Beside) -> dict[str, Counter[str]]:
 def _bars(judged: Sequence[Judged], beside: Beside) -> Iterator[str]:
     yield '<h2 id="verdicts">Claims, paper by paper</h2>\n<div class="bars">'
     for name, count in counts(judged, beside).items():
-        parts = [(how, count[how]) for how in (*VERDICTS, TESTS, NOTHING) if count[how]]
+        parts = [(how, count[how]) for how in ORDER if count[how]]
         said = ", ".join(f"{number} {how}" for how, number in parts)
         title = PAPERS.get(name, "")
         yield f"<p><b>{escape(name)}</b> {escape(title)}, {count.total()} claims</p>"
@@ -131,7 +133,7 @@ def _otherwise(judged: Sequence[Judged], beside: Beside) -> Iterator[str]:
     if careful:
         links = [link(f"#{place_of(row.id, row.checks[0][0])}", row.id) for row in careful]
         about = f'<a href="#{word("reproduced with caveat")}">with a caveat</a>'
-        yield f"<p>{badge('reproduced with caveat')} Reproduced {about}: {listed(links)}.</p>"
+        yield f"<p>Reproduced {about}: {listed(links)}.</p>"
 
 
 def _troubles(shown: Sequence[Shown], judged: Sequence[Judged], misfits: Sequence[str]) -> Iterator[str]:

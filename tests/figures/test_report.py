@@ -8,7 +8,7 @@ import pytest
 
 from figures.claims.figure import VERDICTS
 from figures.report import style
-from figures.report.page import SYMBOLS, badge
+from figures.report.markup import SYMBOLS, badge
 from tests.figures.demos.sound import picture
 from tests.figures.project import figures, project
 
