@@ -79,7 +79,7 @@ def test_ctrl_c_is_answered_clearly_and_loses_nothing(tmp_path, whole):
     assert status == 130
     assert "the same command goes on from there" in said
     assert "Traceback" not in said
-    assert "incomplete" in (tmp_path / "index.html").read_text()
+    assert "Ended early" in (tmp_path / "index.html").read_text()
     assert figures(here, *words) == 0
     assert arrays(tmp_path) == expected
 
