@@ -18,8 +18,8 @@ PAPERS = {
 }
 MEANING: Mapping[Verdict, str] = {
     "reproduced": "The measured value meets the criterion.",
-    "reproduced with caveat": "It meets the criterion, and in the respect that is named what was measured is weaker than "
-    "the paper's sentence.",
+    "reproduced with caveat": "It meets the criterion; in the respect that is named, what was measured is weaker "
+    "than the paper's sentence.",
     "not reproduced": "It misses the criterion; that the opposite holds is not certain, or loop, camera or light are "
     "not the paper's.",
     "refuted": "Under the paper's conditions the opposite holds, with statistical certainty, in the world and at the "

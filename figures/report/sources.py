@@ -38,7 +38,7 @@ def cited(root: Path) -> Mapping[tuple[str, str], tuple[Place, ...]]:
 
 
 def numbers(text: str) -> Iterator[str]:
-    """ "Eq. 17, 36-38" -> Eq. 17, Eq. 36, Eq. 37, Eq. 38; numbers without a kind are sections."""
+    """The numbers in "Eq. 17, 36-38": Eq. 17, Eq. 36, Eq. 37, Eq. 38; numbers without a kind are sections."""
     kind = ""
     for found, first, last in NUMBER.findall(text):
         kind = found or kind

@@ -25,7 +25,10 @@ LEDGER = json.loads((ROOT / "figures" / "ledger.json").read_text())["claims"]
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("GRIS Fig. 2: without a cap, it\nfreezes.\n\nTwo pixels.  And more.", "Without a cap, it freezes. Two pixels."),
+        (
+            "GRIS Fig. 2: without a cap, it\nfreezes.\n\nTwo pixels.  And more.",
+            "Without a cap, it freezes. Two pixels.",
+        ),
         ("GRIS 6.4: what a chain forgets.  [GRIS 6.4]", "What a chain forgets."),
         ("MCMC 3.2.4, 4.2: mutations help. So [MCMC Eq. 3].", "Mutations help. So [MCMC Eq. 3]."),
         ("The scenes of flatland: each with paths.", "The scenes of flatland: each with paths."),
@@ -82,9 +85,7 @@ def test_every_paper_of_the_ledger_has_its_title_from_the_references():
 
 
 def test_scenes_and_errors_lead_to_their_words():
-    assert linked("relMSE on FS1 < 2") == (
-        '<a href="#word-relMSE">relMSE</a> on <a href="#word-FS1">FS1</a> &lt; 2'
-    )
+    assert linked("relMSE on FS1 < 2") == ('<a href="#word-relMSE">relMSE</a> on <a href="#word-FS1">FS1</a> &lt; 2')
     assert linked("FS1x, T, my-MAPE") == "FS1x, T, my-MAPE"
 
 

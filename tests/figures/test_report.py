@@ -1,4 +1,4 @@
-"""Laws of the report: one page beside its pictures, without network, rebuilt from what is stored, honest about damage."""
+"""Laws of the report: a page beside its pictures, without network, rebuilt from what is stored, honest about damage."""
 
 import re
 from html.parser import HTMLParser
