@@ -17,14 +17,14 @@ from figures.report.markup import OTHERWISE, SYMBOLS, kind, link, listed, paper,
 WHAT = (
     "restir-ref computes the figures of four papers on ReSTIR (reservoir-based spatiotemporal importance resampling) "
     "anew, with code that is written to be read beside them. "
-    "What the papers say is cut into claims, each with a number that is measured here, a criterion that could fail, and "
-    "a verdict (<a href='#words'>the words explained</a>). "
+    "What the papers say is cut into claims, each with a number that is measured here, a criterion that could fail, "
+    "and a verdict (<a href='#words'>the words explained</a>). "
     "Claims no figure is about are shown by tests, and the <a href='#all-claims'>table of all claims</a> tells which."
 )
 TESTS, NOTHING = "by tests alone", "not yet"
 ORDER = ("reproduced", "reproduced with caveat", "not reproduced", "refuted", "reported", "not judged", TESTS, NOTHING)
 """From left to right in a bar."""
-MARKS: dict[str, str] = {**SYMBOLS, TESTS: "t", NOTHING: "–"}
+MARKS: dict[str, str] = {**{str(name): mark for name, mark in SYMBOLS.items()}, TESTS: "t", NOTHING: "–"}
 
 
 @dataclass(frozen=True)
