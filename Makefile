@@ -26,7 +26,7 @@ HYPOTHESIS_PROFILE ?= ci
 export HYPOTHESIS_PROFILE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup figures figures-paper test lint audit check notebooks evidence bench clean
+.PHONY: help setup figures figures-paper test lint audit check notebooks notebook-pages evidence bench clean
 
 help:  ## list the targets
 	@echo 'usage: make TARGET [ARGS="..."] [JOBS=2] [OUT=out] [PYTHON=python3]'
@@ -60,6 +60,9 @@ check: lint figures test audit  ## all that must pass before a change is handed 
 
 notebooks: $(STAMP)-notebooks  ## open the notebooks in Jupyter; ARGS="--no-browser" on a machine without one
 	$(PY) -m jupyterlab notebooks $(ARGS)
+
+notebook-pages: $(STAMP)  ## run the notebooks and write them into docs/notebooks; ARGS="01 ..." does some
+	$(PY) -m notebooks.pages $(ARGS)
 
 evidence: $(STAMP)  ## the long runs whose results are committed; hours
 	@if [ -f benchmarks/evidence.py ]; then $(PY) benchmarks/evidence.py $(ARGS); \

@@ -38,6 +38,9 @@ SAME_DENSITY = "the density of every canonical input is p_hat"
 KERNEL = {
     "mis._canonical_share: ...canonical[{0 => -1}]...": SAME_DENSITY,
     "mis._pair: ...canonical[{0 => -1}]...": SAME_DENSITY,
+    "resampling.correction: ...np.ones_like(y.{mW => p_hat})...": "a factor of 1 for each column",
+    "mis.Confidences._numbers: ...{, copy=False => }...": "a copy has the same numbers",
+    "restir.reusing: place = {int(np.argmax(...": "a number prints alike, whatever its type",
     "resampling: ONE = {np.array(1) => 1}": "a factor of 1, as an array or not",
     "resampling._densities.q: ...inputs[{i => j}]...": "i = j in this branch",
     "resampling._check_input: for ...source.X.c), ('weight W', source.X.W})):": "which of two mistakes is named first",
@@ -76,6 +79,13 @@ OF_THEORY = {
         "a correlation is symmetric"
     ),
     "metrics._frequencies: ...{, sparse=True => }...": "the same numbers, in more memory",
+    "images.spread_in_disk.around: ...k {* => /} GOLDEN...": "1 / GOLDEN is 1 + GOLDEN, the same modulo 1",
+    "images.tiles: ...swapaxes({1, 2 => 2, 1})...": "swapping is symmetric",
+    "images.tiles: ...reshape(-{1 => 2})": "any negative number will do",
+    "images.disk: ...reshape(2, -{1 => 2})": "any negative number will do",
+    "images.disk: ...int(radius) + {1 => 2})": "what is beyond the radius is left out",
+    "images.disk: ...{, kind='stable' => })": "steps of one length in another order",
+    "images._rings: ...{, kind='stable' => })...": "steps of one angle in another order",
 }
 AUDIT = {
     "load._check_values: for name in ('{u', 'u_stream => u_stream', 'u}'):": "which of two mistakes is named first",
@@ -99,7 +109,18 @@ TOY1D = {
     "line._kept_cells: ...line.holes({i, j => j, i}, z)...": "holes are symmetric in i and j",
 }
 
-THEORY = ("batch", "chance", "integrals", "guards", "loop", "gradient", "decorrelation", "metrics", "counting")
+THEORY = (
+    "batch",
+    "chance",
+    "integrals",
+    "guards",
+    "loop",
+    "images",
+    "gradient",
+    "decorrelation",
+    "metrics",
+    "counting",
+)
 
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
@@ -124,6 +145,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         ),
         "toy1d": Group(("toy1d/*.py",), ("tests/core/test_*.py", "tests/toy1d/test_*.py"), equivalent=TOY1D),
         "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py",)),
+        "tracer3d": Group(("tracer3d/*.py",), ("tests/tracer3d/test_*.py", "tests/transport/test_spaces.py")),
     }
 )
 

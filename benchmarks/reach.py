@@ -13,7 +13,7 @@ from time import process_time
 from types import CodeType, FrameType
 from typing import Any, NamedTuple
 
-OURS = ("restir_ref", "toy1d", "flatland2d")
+OURS = ("restir_ref", "toy1d", "flatland2d", "tracer3d")
 
 
 class Reached(NamedTuple):

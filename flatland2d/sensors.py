@@ -101,6 +101,11 @@ class FluenceMap:
         return self.columns * self.rows
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the image."""
+        return self.rows, self.columns
+
+    @property
     def numbers(self) -> int:
         """Three numbers: the place in the pixel, and the direction."""
         return 3

@@ -9,7 +9,7 @@ from flatland2d.pictures import eye, lights, measure, outline
 from flatland2d.scenes import Setting
 from restir_ref.batch import Array
 from restir_ref.transport.paths import Path, Tracer
-from restir_ref.transport.reading import (
+from restir_ref.transport.proofs.reading import (
     ExtendedPath,
     extended_path,
     factors,
@@ -24,6 +24,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BASE, OFFSET, JOINT = "#000000", "#56B4E9", "#D55E00"
+
+MARKS = (
+    ("o", BASE, "connectable by this rule"),
+    ("o", "w", "not connectable by it"),
+    ("D", BASE, "where the paths meet"),
+    ("s", "w", "on a light"),
+)
+"""Marks of vertices, their faces and their words in a legend."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +82,9 @@ def why_undefined(p: Pair) -> str:
 def shift_picture(ax: "Axes", setting: Setting, p: Pair) -> None:
     """Base path black, replayed part of the offset path blue, its reconnection broad and red.
 
-    Full vertices are rough enough to connect, open ones are not, a diamond is where the paths meet, a
-    square is on a light.  The title is `pair_in_words`.
+    Full vertices are connectable under the rule of the path's tracer, that is rough enough for it: under
+    replay none is, under reconnection nearly all are, however smooth.  Open ones are not.  A diamond is where
+    the paths meet, a square is on a light.  The title is `pair_in_words`.
     """
     outline(ax, setting.scene)
     lights(ax, setting.scene)
@@ -86,11 +95,7 @@ def shift_picture(ax: "Axes", setting: Setting, p: Pair) -> None:
     ax.plot(*replayed.T, color=OFFSET, ls="--", lw=2.0, marker="", zorder=3.2, label="offset path, replayed")
     if p.c:
         ax.plot(*y[p.c - 1 : p.c + 1].T, color=JOINT, ls="-", lw=3.0, marker="", zorder=3.1, label="reconnection")
-    for mark, colour, words in (
-        ("o", BASE, "rough vertex"),
-        ("o", "w", "smooth vertex"),
-        ("D", BASE, "meeting vertex"),
-    ):
+    for mark, colour, words in MARKS:
         ax.scatter([], [], s=38, marker=mark, color=colour, edgecolors=BASE, lw=1.4, label=words)
     _vertices(ax, p, p.x, len(x), "x", BASE)
     _vertices(ax, p, p.y, p.c or len(y), "y", OFFSET)
@@ -100,13 +105,19 @@ def shift_picture(ax: "Axes", setting: Setting, p: Pair) -> None:
     ax.set_title(pair_in_words(p))
 
 
+def connectable_vertices(t: Tracer, x: ExtendedPath) -> Array:
+    """Which vertices of a path of one column are rough enough for its tracer's rule, never a mirror; (K,) bool."""
+    rough = roughnesses(t, x)[:, 0]
+    return np.asarray((rough > 0) & (rough >= t.rule.roughness))
+
+
 def _vertices(ax: "Axes", p: Pair, path: ExtendedPath, upto: int, name: str, colour: str) -> None:
     """Marks and names of vertices 1 .. upto - 1."""
-    rough, k = roughnesses(p.t, path)[:, 0], int(path.k[0])
+    full, k = connectable_vertices(p.t, path), int(path.k[0])
     for i in range(1, min(upto, k + 2)):
-        (x, y), full = path.x[i, :, 0], rough[i] > 0 and rough[i] >= p.t.rule.roughness
+        x, y = path.x[i, :, 0]
         mark, size = ("D", 55) if i == p.c else ("s", 30) if i == k + 1 else ("o", 38)
-        face = colour if full else "w"
+        face = colour if full[i] else "w"
         ax.scatter(x, y, s=size, marker=mark, color=face, edgecolors=colour, lw=1.4, zorder=4)
         common = np.array_equal(p.x.x[i], p.y.x[i])
         if path is p.x or not common:

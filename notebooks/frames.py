@@ -15,7 +15,7 @@ from figures.experiments.rendering import path_tracing
 from figures.report import style
 from flatland2d import SCENES
 from flatland2d.motion import motion, sources
-from flatland2d.pictures import scene_picture
+from flatland2d.pictures import fluence_ticks, scene_picture
 from flatland2d.tone import exposure, tone
 from notebooks.show import Table
 from restir_ref import Live, Pixels, Reservoirs, shade
@@ -33,6 +33,8 @@ FRAMES, REPLICAS = 24, 8
 CAPS = {"1": 1.0, "5": 5.0, "20": 20.0, "none": np.inf}
 STEPS = {"still": 0.0, "slow": 0.001, "fast": 0.003}
 """How far the camera moves sideways per frame, in unit lengths."""
+SCALE_UP_TO = 20
+"""Largest number on the scale of a picture, in units of the radiance in the middle of its tones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,9 +151,13 @@ def waterfall(scene: str, cap: str, camera: str) -> "Picture":
     picture, (axes,) = style.panels(1, 2, width=3.9, height=3.0)
     titles = (f"{scene}, {camera}: one path tree", f"ReSTIR PT, cap {cap}")
     for ax, values, title in zip(axes, (found.paths, found.images), titles, strict=True):
-        ax.imshow(tone(values[:, 0], e), vmin=0, vmax=1, aspect="auto")
+        extent = (-0.5, values.shape[-1] - 0.5, FRAMES + 0.5, 0.5)
+        image = ax.imshow(tone(values[:, 0], e), vmin=0, vmax=1, aspect="auto", extent=extent)
         ax.set(xlabel="pixel of the inset", ylabel="frame", title=title)
         ax.grid(visible=False)
+    ticks = fluence_ticks(e, SCALE_UP_TO / e)
+    bar = picture.colorbar(image, ax=axes[1], label="radiance")
+    bar.set_ticks(list(tone(ticks, e)), labels=[f"{L:g}" for L in ticks])
     return picture
 
 

@@ -14,13 +14,13 @@ from figures.report import style
 from notebooks.show import Table
 from restir_ref.batch import Array
 from restir_ref.oracle.cells import Cells, cells
-from restir_ref.oracle.scenes import Parts, Scene
+from restir_ref.oracle.scenes import Parts, Scene, reference_scene
 from restir_ref.oracle.zoo import BUGS, CHECKS, INEFFICIENT, Bug, exact_bias, examine
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
 
-NOTHING = "nothing wrong"
+NOTHING, OWN = "nothing wrong", "your own"
 ROUNDING = 1e-9
 """Whatever differs by more than this is a bias."""
 
@@ -57,6 +57,21 @@ def line_up(number: int, guilty: int = 4, wasteful: int = 1, innocent: int = 1) 
 
 def _some(family: Mapping[str, Bug], count: int, rng: np.random.Generator) -> list[Bug]:
     return [list(family.values())[k] for k in rng.permutation(len(family))[:count]]
+
+
+def planted(letter: str, **parts: Any) -> Suspect:
+    """A suspect of one's own on the reference scene: the right loop of two frames with some `Parts` replaced."""
+    own = Parts(**parts)
+    bug = Bug(
+        OWN,
+        "It was written here.",
+        "see for yourself",
+        "nothing, or what you have put in",
+        reference_scene,
+        Parts(),
+        own,
+    )
+    return Suspect(letter, reference_scene(), own, bug, OWN)
 
 
 # ---------------------------------------------------------------- experiments: the same estimator elsewhere
@@ -154,16 +169,16 @@ def _largest(values: Array) -> float:
     return float(values.flat[abs(values).argmax()])
 
 
-def cells_of(suspect: Suspect, experiment: str) -> "Picture":
-    """The bias of every cell, pixel by pixel."""
-    found = bias(suspect, experiment)
+def cells_of(suspects: LineUp, letter: str, experiment: str) -> "Picture":
+    """The exact relative bias of every cell of an estimator, pixel by pixel."""
+    found = bias(suspects[letter], experiment)
     limit = max(0.1, 1.1 * float(abs(found).max()))
     picture, (panels,) = style.panels(1, len(found), width=6.4 / len(found), height=2.6)
     for pixel, (ax, values) in enumerate(zip(panels, found, strict=True), start=1):
         x = np.arange(1, len(values) + 1)
         ax.bar(x, values, color=style.COLOURS[0])
         ax.axhline(0, color="k", lw=0.8)
-        ax.set(xlabel="cell", xticks=x, ylim=(-limit, limit), title=f"{suspect.letter}, pixel {pixel}")
+        ax.set(xlabel="cell", xticks=x, ylim=(-limit, limit), title=f"{letter}, {experiment}: pixel {pixel}")
     panels[0].set_ylabel("relative bias")
     return picture
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from figures.report import style
-from restir_ref import WEIGHTS, Live, Pixels, Reservoirs, Shifted, initial, shade, spatial, temporal
+from restir_ref import WEIGHTS, Live, Pixels, Reservoirs, Shifted, Weights, initial, shade, spatial, temporal
 from restir_ref.batch import Array
 from restir_ref.integrals import p_hat_from
 from restir_ref.mis import Confidences
@@ -138,20 +138,25 @@ def reuse(power: float, mis: str) -> Array:
 
 
 def jacobian(power: float, mis: str) -> "Picture":
-    """The mean brightness of both pixels, where 1 is right, with J to a power."""
-    (mean, error), (picture, axes) = reuse(power, mis), style.panels(width=4.6, height=2.4)
+    """The mean brightness of both pixels, where 1 is right, with 3 standard errors."""
+    (mean, error), (picture, axes) = reuse(power, mis), style.panels(width=5.4, height=2.4)
     ax = axes[0, 0]
     ax.axhline(1, color="k", lw=0.8)
     ax.errorbar([1, 2], mean, 3 * error, ls="", marker="o", ms=7, capsize=4)
-    ax.set(xlim=(0.5, 2.5), ylim=(0.5, 1.6), xticks=[1, 2], xlabel="pixel", ylabel="mean estimate / truth")
-    ax.set_title(f"J to the power {power:g}, {mis} weights, 3 standard errors")
+    ax.set(xlim=(0.5, 2.5), ylim=(0.3, 1.7), xticks=[1, 2], xlabel="pixel", ylabel="mean estimate / truth")
+    ax.set_title(f"J to the power {power:g}, {mis} weights: {mean[0]:.2f} and {mean[1]:.2f} of the truth")
     return picture
 
 
 # ---------------------------------------------------------------- MIS weights
 
 
-def shares(mis: str, nodes: int = 900) -> Mapping[str, Array]:
+def shares(mis: str) -> Mapping[str, Array]:
+    """`shares_of` the weights of that name."""
+    return shares_of(WEIGHTS[mis])
+
+
+def shares_of(mis: Weights, nodes: int = 900) -> Mapping[str, Array]:
     """The contribution MIS weights c_i(y) of seven pixels for the centre one, (7, y).  [GRIS Eq. 13, 17, 35-38]
 
     With the nodes y and, there, p_hat.
@@ -161,7 +166,7 @@ def shares(mis: str, nodes: int = 900) -> Mapping[str, Array]:
     near = [here, *(Pixels(line, np.full(nodes, i)) for i in (0, 1, 2, 4, 5, 6))]
     densities = [line.target(here.index, y), *(p_hat_from(at, y, here) for at in near[1:])]
     c = Confidences([np.ones(nodes)] * 7, [0])
-    weight = WEIGHTS[mis].c or WEIGHTS[mis].m
+    weight = mis.c or mis.m
     each = np.stack(np.broadcast_arrays(*(weight(i, lambda j: densities[j], c) for i in range(7))))
     return {"y": y, "c": np.where(np.stack(densities) > 0, each, 0.0), "p_hat": densities[0]}
 

@@ -18,9 +18,9 @@ from flatland2d.shift_pictures import Pair, pair, pair_in_words, shift_picture
 from notebooks.show import Table
 from restir_ref import Live, Pixels, initial
 from restir_ref.batch import Array, ratio, take
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import REPLAY, Path, Tracer
-from restir_ref.transport.reading import factors
+from restir_ref.transport.proofs.inversion import traced
+from restir_ref.transport.proofs.reading import factors
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.shifts import shift_path
 
@@ -61,27 +61,27 @@ def shifted(shift: str, pixels: int, roughness: float) -> "Picture":
     picture, axes = style.panels(width=7.6, height=3.2)
     found = in_corridor(shift, pixels, roughness)
     shift_picture(axes[0, 0], corridor(roughness), found)
-    return _with_legend(picture, shift, found)
+    return _with_legend(picture, f"{shift.capitalize()}, {pixels:+} pixels", found)
 
 
 def example(shift: str, number: int) -> "Picture":
     """A random path of the glossy Cornell room and its offset path, 100 pixels on."""
-    t, x, i = _lit_paths("glossy_cornell", shift)
+    t, x, i = lit_paths("glossy_cornell", shift)
     found = pair(t, take(x, np.array([number])), int(i[number]), int(i[number]) + 100)
     picture, axes = style.panels(width=6.4, height=4.0)
     shift_picture(axes[0, 0], SCENES["glossy_cornell"](), found)
-    return _with_legend(picture, shift, found)
+    return _with_legend(picture, f"Path {number}, {shift}", found)
 
 
-def _with_legend(picture: "Picture", shift: str, found: Pair) -> "Picture":
+def _with_legend(picture: "Picture", what: str, found: Pair) -> "Picture":
     (ax,) = picture.axes
-    ax.set_title(f"{shift.capitalize()}: {pair_in_words(found)}")
+    ax.set_title(f"{what}: {pair_in_words(found)}")
     ax.legend(loc="upper left", bbox_to_anchor=(1.06, 1.0))
     return picture
 
 
 @cache
-def _lit_paths(name: str, shift: str, count: int = 400) -> tuple[Tracer, Path, Array]:
+def lit_paths(name: str, shift: str, count: int = 400) -> tuple[Tracer, Path, Array]:
     """Tracer, random paths with light, and their pixels: the same for every shift."""
     setting, rng = SCENES[name](), np.random.default_rng(SEED)
     t = Tracer(setting.scene, setting.pinhole(1920, 0), setting.depth, SHIFTS[shift])
@@ -161,7 +161,7 @@ def alike(values: Array) -> float:
 
 def there_and_back(name: str, shift: str) -> tuple[float, float]:
     """Largest |J J' - 1| over paths shifted there and back, and the share of those that do not come back."""
-    t, x, i = _lit_paths(name, shift)
+    t, x, i = lit_paths(name, shift)
     y, J = shift_path(t, x, i + NEAR)
     there = np.flatnonzero((J > 0) & y.F.any(axis=0))
     _, J_back = shift_path(t, take(y, there), i[there])

@@ -88,14 +88,15 @@ def by_sampling(estimator: str) -> "Picture":
     counts = np.unique(np.geomspace(10, len(e), 17).astype(int))
     mean = np.array([e[:k].mean() for k in counts])
     error = np.array([e[:k].std(ddof=1) / np.sqrt(k) for k in counts])
-    picture, axes = style.panels(width=6.2, height=2.9)
+    picture, axes = style.panels(width=7.4, height=2.9)
     ax, bias = axes[0, 0], bias_of_image(estimator)[0]
     ax.errorbar(counts, mean - 1, 2 * error, ls="", marker="o", markevery=1, label="mean, 2 standard errors")
     ax.axhline(0, color="k", lw=1.2)
     ax.axhline(bias, color=style.COLOURS[3], ls="--", lw=1.5, label="exact bias")
-    ax.set(xscale="log", xlabel="samples", ylabel="relative error of the mean", ylim=(-0.3, 0.3))
+    limit = max(0.05, 1.4 * abs(bias))
+    ax.set(xscale="log", xlabel="samples", ylabel="relative error of the mean", ylim=(-limit, limit))
     ax.set_title(f"{estimator}: {bias:+.2%} in pixel 1")
-    ax.legend(loc="upper right")
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return picture
 
 
@@ -111,6 +112,7 @@ def per_cell(estimator: str) -> "Picture":
         ax.axhline(0, color="k", lw=0.8)
         ax.set(xlabel="cell $y$", xticks=np.arange(1, len(values) + 1), ylim=_frame(bias), title=f"Pixel {pixel}")
     panels[0].set_ylabel("relative bias")
+    picture.suptitle(estimator, fontsize=10)
     return picture
 
 
@@ -198,7 +200,12 @@ def three_ways(mis: str) -> "Picture":
         loop = spatial_loop(scene, WEIGHTS[mis], k)
         found = squares(loop, scene, np.arange(2 * count), Live(np.random.default_rng(SEED)))[0, ::2]
         error = ((found - found.mean()) ** 2).std() / np.sqrt(count)
-        look = {"marker": "o", "color": style.COLOURS[3], "label": "20 000 samples, 2 errors" if k == 0 else None}
+        look = {
+            "marker": "o",
+            "markevery": 1,
+            "color": style.COLOURS[3],
+            "label": "20 000 samples, 2 errors" if k == 0 else None,
+        }
         ax.errorbar(k, found.var(), 2 * error, ls="", capsize=3, **look)
     ax.set(
         xlabel="rounds of spatial reuse",

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from restir_ref.batch import Array, Batch, map_leaves
+from restir_ref.batch import Array, Batch, in_memory
 
 Member = TypeVar("Member")
 
@@ -42,7 +42,7 @@ def per_column(values: Array, n: int, what: str) -> Array:
 
 
 def aligned(batch: Batch, n: int, what: str) -> Batch:
-    """Return `batch` if all its leaves have n columns.
+    """Return `batch` if all its leaves have n columns, or a reference's index and own fields.
 
     Raises ValueError naming the shape of one that has not: it would be broadcast without a word.
     """
@@ -55,7 +55,7 @@ def aligned(batch: Batch, n: int, what: str) -> Batch:
             )
         return leaf
 
-    map_leaves(checked, batch)
+    in_memory(checked, batch)
     return batch
 
 
@@ -67,8 +67,7 @@ def read_only(batch: Batch) -> Batch:
         view.flags.writeable = False
         return view
 
-    views: Batch = map_leaves(locked, batch)
-    return views
+    return in_memory(locked, batch)
 
 
 def apart(one: Batch, other: Batch, what: str) -> None:
@@ -88,7 +87,7 @@ def _writeable(batch: Batch) -> list[Any]:
         found.append(leaf.__array_interface__["data"][0] if leaf.flags.writeable and leaf.size else object())
         return leaf
 
-    map_leaves(noted, batch)
+    in_memory(noted, batch)
     return found
 
 

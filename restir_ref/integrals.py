@@ -6,15 +6,16 @@ pixels read a column as  column = replica * n + pixel,  so replicas, and the lan
 oracle, are just more columns.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array, columns, take, wide
+from restir_ref.batch import Array, columns, joined, part, take, wide
 from restir_ref.chance import Chance
-from restir_ref.guards import aligned, nonnegative, per_column, read_only
+from restir_ref.guards import aligned, apart, nonnegative, per_column, read_only
 
 Sample = Any
 
@@ -120,6 +121,29 @@ def shifted(x: Sample, at: Pixels, to: Pixels) -> Shifted:
     J = per_column(np.asarray(y.J), len(to.index), "the Jacobian J")
     nonnegative(J, "the Jacobian J", "Return |dT/dx| from shift(), its absolute value, and 0 where T is undefined.")
     return Shifted(aligned(y.x, len(to.index), "the samples y = T(x) of a shift"), J)
+
+
+def shifted_together(xs: Sequence[Sample], ats: Sequence[Pixels], tos: Sequence[Pixels]) -> Sequence[Shifted]:
+    """Every x of its domains `at` shifted to its domains `to`; from one image to one other by one call."""
+    images = [(id(at.of), id(to.of)) for at, to in zip(ats, tos, strict=True)]
+    found: dict[int, Shifted] = {}
+    for pair in dict.fromkeys(images):
+        group = [i for i, each in enumerate(images) if each == pair]
+        at, to = (Pixels(domains[group[0]].of, joined([domains[i].index for i in group])) for domains in (ats, tos))
+        y = shifted(joined([xs[i] for i in group]), at, to)
+        J, stop = y.J if y.J.shape else np.full(to.index.shape, y.J), 0
+        for i in group:
+            start, stop = stop, stop + len(tos[i].index)
+            found[i] = Shifted(part(y.x, slice(start, stop)), J[start:stop])
+    return kept_apart([found[i] for i in range(len(xs))])
+
+
+def kept_apart(ys: Sequence[Shifted]) -> Sequence[Shifted]:
+    """The same shifted samples, none of which has overwritten the one before it."""
+    for one, other in pairwise(ys):
+        apart(one.x, other.x, "samples from shift()")
+        apart(one.J, other.J, "Jacobians from shift()")
+    return ys
 
 
 def weighted(at: Pixels, x: Sample, W: Array) -> Array:

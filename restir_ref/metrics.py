@@ -4,6 +4,7 @@ Pixels come last, leading axes (replicas, frames) are kept.  Where neighbourhood
 `axes` names the pixel axes: ROW for (..., n), MAP for (..., rows, columns).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod, tau
 
@@ -22,29 +23,30 @@ REPLICAS = 64
 """The fewest replicas of which bias and variance are told apart."""
 
 
-def mape(image: Array, reference: Array) -> Array:
-    """mean |I - R| / (.01 mean R + R): free of the images' scale; (..., n) -> (...).  [GRIS 9.3, footnote 13]"""
-    return np.asarray((abs(image - reference) / (SMALL * _mean(reference) + reference)).mean(axis=-1))
+def mape(image: Array, reference: Array, axes: Axes = ROW) -> Array:
+    """mean |I - R| / (.01 mean R + R): free of the images' scale; (..., pixels) -> (...).  [GRIS 9.3, footnote 13]"""
+    return np.asarray((abs(image - reference) / (SMALL * _mean(reference, axes) + reference)).mean(axis=axes))
 
 
-def mape_with_floor(image: Array, reference: Array) -> Array:
-    """mean |I - R| / (R + .01): depends on the images' scale; (..., n) -> (...).  [DDGIR 4]"""
-    return np.asarray((abs(image - reference) / (reference + SMALL)).mean(axis=-1))
+def mape_with_floor(image: Array, reference: Array, axes: Axes = ROW) -> Array:
+    """mean |I - R| / (R + .01): depends on the images' scale; (..., pixels) -> (...).  [DDGIR 4]"""
+    return np.asarray((abs(image - reference) / (reference + SMALL)).mean(axis=axes))
 
 
-def rel_mse(image: Array, reference: Array) -> Array:
-    """mean (I - R)^2 / (R^2 + (.01 mean R)^2); (..., n) -> (...)."""
-    return np.asarray(((image - reference) ** 2 / (reference**2 + (SMALL * _mean(reference)) ** 2)).mean(axis=-1))
+def rel_mse(image: Array, reference: Array, axes: Axes = ROW) -> Array:
+    """mean (I - R)^2 / (R^2 + (.01 mean R)^2); (..., pixels) -> (...)."""
+    scale2 = reference**2 + (SMALL * _mean(reference, axes)) ** 2
+    return np.asarray(((image - reference) ** 2 / scale2).mean(axis=axes))
 
 
-def rmse(image: Array, reference: Array) -> Array:
-    """sqrt(mean (I - R)^2); (..., n) -> (...)."""
-    return np.asarray(np.sqrt(((image - reference) ** 2).mean(axis=-1)))
+def rmse(image: Array, reference: Array, axes: Axes = ROW) -> Array:
+    """sqrt(mean (I - R)^2); (..., pixels) -> (...)."""
+    return np.asarray(np.sqrt(((image - reference) ** 2).mean(axis=axes)))
 
 
-def _mean(reference: Array) -> Array:
-    """The mean of every reference of its own, (..., 1)."""
-    return np.asarray(reference.mean(axis=-1, keepdims=True))
+def _mean(reference: Array, axes: Axes) -> Array:
+    """The mean of every reference of its own, pixel axes kept."""
+    return np.asarray(reference.mean(axis=axes, keepdims=True))
 
 
 # ---------------------------------------------------------------- many images of the same
@@ -161,30 +163,52 @@ def _means(S: Array, axes: Axes, *bands: Array) -> list[Array]:
 
 def correlation(a: Array, b: Array) -> Array:
     """sum a b / sqrt(sum a^2 sum b^2) of errors, whose mean is 0 where nothing is biased; in [-1, 1]."""
-    return ratio((a * b).sum(), np.sqrt((a**2).sum() * (b**2).sum()))
+    return _correlation([(a, b)])
 
 
-def neighbour_correlation(errors: Array, reach: int = 8) -> Array:
-    """Correlation of e(x) and e(x + r) for r = 1 .. reach, over all x and all images; (..., n) -> (reach,).
+def _correlation(pairs: Sequence[tuple[Array, Array]]) -> Array:
+    """The same, with sums over all pairs of arrays."""
+    ab, a2, b2 = (total([*terms]) for terms in zip(*map(_sums, pairs), strict=True))
+    return ratio(ab, np.sqrt(a2 * b2))
 
+
+def _sums(pair: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+    """sum a b, sum a^2, sum b^2."""
+    a, b = pair
+    return (a * b).sum(), (a**2).sum(), (b**2).sum()
+
+
+def neighbour_correlation(errors: Array, reach: int = 8, axes: Axes = ROW) -> Array:
+    """Correlation of e(x) and e(x + r) for r = 1 .. reach, over all x and all images; (..., pixels) -> (reach,).
+
+    In a map, x + r is r pixels away along either axis; along one of them with that axis alone.
     Raises ValueError for a reach that leaves the image.
     """
-    n = errors.shape[-1]
+    n = min(errors.shape[axis] for axis in axes)
     if not 0 < reach < n:
         raise ValueError(f"the reach must be 1 .. {n - 1} pixels in an image of {n}, but is {reach}.")
-    return np.array([correlation(errors[..., :-r], errors[..., r:]) for r in range(1, reach + 1)])
+    along = _along(errors, axes)
+    return np.array([_correlation([(e[..., :-r], e[..., r:]) for e in along]) for r in range(1, reach + 1)])
 
 
-def tile_contrast(errors: Array, tile: int = 16) -> Array:
-    """Correlation of next neighbours inside tiles minus that across their borders; (..., n) -> ().  [GRIS Fig. 14]
+def tile_contrast(errors: Array, tile: int = 16, axes: Axes = ROW) -> Array:
+    """Correlation of next neighbours inside tiles minus that across their borders; (..., pixels) -> ().  [GRIS Fig. 14]
 
-    0 if tiles leave no trace.  Tiles begin at the first pixel.  Raises ValueError for tiles without an
-    inside, or an image without a border between two.
+    0 if tiles leave no trace.  Tiles begin at the first pixel; in a map they are squares of this side.  Raises
+    ValueError for tiles without an inside, or an image without a border between two.
     """
-    n = errors.shape[-1]
+    n = min(errors.shape[axis] for axis in axes)
     if not 1 < tile < n:
         raise ValueError(f"tiles must have 2 .. {n - 1} pixels in an image of {n}, but have {tile}.")
-    left, right = errors[..., :-1], errors[..., 1:]
-    border = np.arange(1, n) % tile == 0
-    inside, across = (correlation(left[..., pairs], right[..., pairs]) for pairs in (~border, border))
-    return np.asarray(inside - across)
+    inside, across = [], []
+    for e in _along(errors, axes):
+        left, right = e[..., :-1], e[..., 1:]
+        border = np.arange(1, e.shape[-1]) % tile == 0
+        inside.append((left[..., ~border], right[..., ~border]))
+        across.append((left[..., border], right[..., border]))
+    return np.asarray(_correlation(inside) - _correlation(across))
+
+
+def _along(errors: Array, axes: Axes) -> list[Array]:
+    """The errors with each of the axes last in turn."""
+    return [np.moveaxis(errors, axis, -1) for axis in axes]

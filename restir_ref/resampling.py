@@ -4,17 +4,18 @@ RIS and GRIS are the same lines: `select` does not know whether its candidates c
 (initial candidates, W = 1/p) or, shifted, from other pixels and frames (`weigh`).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
 from restir_ref.batch import Array, pick, ratio, total, wide
 from restir_ref.chance import Chance
 from restir_ref.guards import aligned, apart, nonnegative, per_column
-from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, p_hat_from, shifted, target
+from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, kept_apart, shifted_together, target
 from restir_ref.mis import ANY, CANONICAL_COVERS, Confidences, Density, Weights
 
 LARGEST_CONFIDENCE = 2.0**100
@@ -32,6 +33,10 @@ class Input:
 
     X: Reservoirs
     at: Pixels
+
+
+Landed = tuple[Shifted, Array]
+"""Y_i = T_i(X_i), and p_hat(Y_i) (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +57,9 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
     the weights need one.
     """
     c = _confidences(inputs, here, mis)
-    for i, (source, y, p_hat) in enumerate(_landed(inputs, here)):
-        q = _densities(i, y, p_hat, inputs, here, mis.proxy)
+    landed = _landed(inputs, here)
+    for i, (source, (y, p_hat)) in enumerate(zip(inputs, landed, strict=True)):
+        q = _densities(i, landed, inputs, here, mis.proxy)
         m = mis.m(i, q, c)
         c_over_m = None if mis.c is None else ratio(mis.c(i, q, c), m)
         if mis.unbiased_for == ANY:
@@ -142,32 +148,33 @@ def _stacked(w: Sequence[Array]) -> Array:
     return np.stack(np.broadcast_arrays(*w))
 
 
-def _landed(inputs: Sequence[Input], here: Pixels) -> Iterator[tuple[Input, Shifted, Array]]:
-    """Every input with its Y_i and p_hat(Y_i), none of which has overwritten the one before it."""
-    found: dict[str, Sample] = {}
-    for source in inputs:
-        y = _shifted(source, here)
-        p_hat = target(here, y.x)
-        moved = {} if source.at is here else {"samples from shift()": y.x, "Jacobians from shift()": y.J}
-        new = {"results of target()": p_hat, **moved}
-        for what in new.keys() & found.keys():
-            apart(found[what], new[what], what)
-        found |= new
-        yield source, y, p_hat
+def _landed(inputs: Sequence[Input], here: Pixels) -> list[Landed]:
+    """Every Y_i and p_hat(Y_i), none of which has overwritten the one before it."""
+    away = [source for source in inputs if source.at is not here]
+    moved = iter(shifted_together([each.X.x for each in away], [each.at for each in away], [here] * len(away)))
+    ys = [Shifted(source.X.x, ONE) if source.at is here else next(moved) for source in inputs]
+    p_hats = [target(here, y.x) for y in ys]
+    for one, other in pairwise(p_hats):
+        apart(one, other, "results of target()")
+    return list(zip(ys, p_hats, strict=True))
 
 
-def _shifted(source: Input, here: Pixels) -> Shifted:
-    """Y_i = T_i(X_i); the identity for canonical inputs."""
-    if source.at is here:
-        return Shifted(source.X.x, ONE)
-    return shifted(source.X.x, source.at, here)
+def _densities(i: int, landed: Sequence[Landed], inputs: Sequence[Input], here: Pixels, proxy: Proxy) -> Density:
+    """q(j) = p_hat_from_j(Y_i), computed when the first is asked for.  [GRIS Eq. 35]
 
-
-def _densities(i: int, y: Shifted, p_hat: Array, inputs: Sequence[Input], here: Pixels, proxy: Proxy) -> Density:
-    """q(j) = p_hat_from_j(Y_i), computed when first asked for; p_hat is that of `here`.
-
+    The factor "y in T_j(supp X_j)" is in p_hat_j, whose support lies inside supp X_j.
     The own density needs no shift back: T_i^-1(Y_i) = X_i and |dT_i^-1| = 1 / J_i.
     """
+    y, p_hat = landed[i]
+    away = [z for (z, _), source in zip(landed, inputs, strict=True) if source.at is not here]
+
+    @cache
+    def back() -> Mapping[int, Array]:
+        others = [j for j, source in enumerate(inputs) if source.at is not here and j != i]
+        ats = [inputs[j].at for j in others]
+        xs = shifted_together([y.x] * len(others), [here] * len(others), ats)
+        kept_apart([*away[:1], *xs[:1]])
+        return {j: x.J * proxy(at, x.x) for j, at, x in zip(others, ats, xs, strict=True)}
 
     @cache
     def q(j: int) -> Array:
@@ -176,7 +183,7 @@ def _densities(i: int, y: Shifted, p_hat: Array, inputs: Sequence[Input], here: 
             return p_hat if proxy is target else proxy(here, y.x)
         if j == i:
             return ratio(proxy(at, inputs[i].X.x), y.J)
-        return p_hat_from(at, y.x, here, proxy)
+        return back()[j]
 
     return q
 

@@ -12,8 +12,8 @@ from figures.claims.figure import verdict_of
 from figures.engine.registry import faults
 from restir_ref import Live, Pixels, initial, shade
 from restir_ref.oracle.zoo import exact_bias
-from restir_ref.transport.judge import judge
-from restir_ref.transport.shift_checks import Effort
+from restir_ref.transport.proofs.judge import judge
+from restir_ref.transport.proofs.shift_checks import Effort
 from tests.checkout import ROOT
 from toy1d import Line
 

@@ -23,11 +23,14 @@ PAPERS = ("figures.gris", "figures.gradient", "figures.mcmc", "figures.ddgi", "f
 CLAIMS, ENGINE, REPORT, SHARED = "figures.claims", "figures.engine", "figures.report", "figures.experiments"
 STORE, STYLE = "figures.engine.store", "figures.report.style"
 """What of the engine reference images need, and what of the report a figure's `draw` needs."""
-BELOW = {THEORY, TRANSPORT, *WORLDS}
+BASELINES, PROOFS = f"{TRANSPORT}.baselines", f"{TRANSPORT}.proofs"
+BELOW = {THEORY, TRANSPORT, BASELINES, PROOFS, *WORLDS}
 MAY_IMPORT = {
     THEORY: {THEORY},
     TRANSPORT: {THEORY, TRANSPORT},
-    **{world: {THEORY, TRANSPORT, world} for world in WORLDS},
+    BASELINES: {THEORY, TRANSPORT, BASELINES},
+    PROOFS: {THEORY, TRANSPORT, PROOFS},
+    **{world: {THEORY, TRANSPORT, BASELINES, PROOFS, world} for world in WORLDS},
     CLAIMS: {THEORY, CLAIMS},
     STORE: {CLAIMS, ENGINE},
     ENGINE: {CLAIMS, ENGINE, STORE},
@@ -102,6 +105,10 @@ UPWARD = {
     "theory to figures": ("restir_ref/mis.py", "from figures.report import style"),
     "theory to transport": ("restir_ref/mis.py", "from . import transport"),
     "oracle to transport": ("restir_ref/oracle/audit.py", "from ..transport.paths import trace"),
+    "renderer to baseline": ("restir_ref/transport/paths.py", "from restir_ref.transport.baselines import restir_gi"),
+    "renderer to proof": ("restir_ref/transport/restir_pt.py", "from .proofs.judge import judge"),
+    "baseline to proof": ("restir_ref/transport/baselines/restir_gi.py", "from ..proofs import reading"),
+    "proof to baseline": ("restir_ref/transport/proofs/judge.py", "from ..baselines import restir_di"),
     "transport to world": ("restir_ref/transport/paths.py", "def late():\n    from toy1d import pixels"),
     "world to world": ("flatland2d/scenes.py", "from toy1d import pixels"),
     "figures to tests": ("figures/runner.py", "from tests import conftest"),
@@ -209,12 +216,13 @@ def test_a_list_of_figures_is_noticed(tmp_path, path, name):
 
 # ---------------------------------------------------------------- chance
 
+DOORS = ("restir_ref.chance", "tracer3d.cli")
 DICE = re.compile(r"(?:(?:np|numpy)\.)?random\.(?!Generator$)\w+|(?:numpy\.)?random$")
 
 
 def own_dice(root: Path) -> list[str]:
-    """Uses of a random number generator below the figures; only `chance.py` is the door."""
-    below = [module for module in modules(root, (THEORY, *WORLDS)) if module.name != "restir_ref.chance"]
+    """Uses of a random number generator below the figures; only `chance.py` is the door, and commands bring a seed."""
+    below = [module for module in modules(root, (THEORY, *WORLDS)) if module.name not in DOORS]
     uses = ((module, use) for module in below for use in (*imported(module), *attributes(module)))
     return [f"{module.name} uses {use}" for module, use in uses if DICE.match(use)]
 

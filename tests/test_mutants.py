@@ -8,7 +8,7 @@ import pytest
 from benchmarks.groups import GROUPS, OMITTED
 from tests.checkout import ROOT, plant
 
-PACKAGES = ("restir_ref", "toy1d", "flatland2d")
+PACKAGES = ("restir_ref", "toy1d", "flatland2d", "tracer3d")
 
 
 @pytest.fixture(autouse=True)

@@ -22,10 +22,8 @@ from restir_ref.integrals import Image, Pixels
 from restir_ref.loop import REAL_TIME, frame, random_in_row
 from restir_ref.mis import Weights
 from restir_ref.restir import shade
-from restir_ref.transport.path_reuse import path_reuse
-from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit, trace
-from restir_ref.transport.rays import emitted
-from restir_ref.transport.restir_di import (
+from restir_ref.transport.baselines.path_reuse import path_reuse
+from restir_ref.transport.baselines.restir_di import (
     BIASED,
     DEBIASED,
     LightIntegrals,
@@ -33,7 +31,9 @@ from restir_ref.transport.restir_di import (
     indirect_light,
     light_integrals,
 )
-from restir_ref.transport.restir_gi import RadianceIntegrals
+from restir_ref.transport.baselines.restir_gi import RadianceIntegrals
+from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit, trace
+from restir_ref.transport.rays import emitted
 from restir_ref.transport.restir_pt import PathIntegrals
 
 REPLICAS, FRAMES, EPS = 64, 3, 0.005

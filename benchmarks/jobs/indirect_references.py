@@ -32,9 +32,9 @@ from flatland2d.radiosity import film_points, render
 from flatland2d.scenes import SCENES, Setting
 from restir_ref.batch import Array
 from restir_ref.integrals import Pixels
+from restir_ref.transport.baselines.restir_di import LightSample, indirect_light, light_integrals, visibility
 from restir_ref.transport.paths import RECONNECTION, Tracer
 from restir_ref.transport.rays import sample_light
-from restir_ref.transport.restir_di import LightSample, indirect_light, light_integrals, visibility
 from restir_ref.transport.scene import Scene
 
 QUADRATURE, AT_ONCE = ((2048, 16), (4096, 32)), 2**16

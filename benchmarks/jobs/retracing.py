@@ -17,8 +17,8 @@ from benchmarks.jobs.roundtrips import AROUND, EXAMINED, NEAR, REACH, film, lit
 from figures.claims.figure import Arrays
 from flatland2d.scenes import SCENES
 from restir_ref.batch import Array, take
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.shifts import shift_path
 from tests.transport.paths import Shifts, finite_difference_jacobian, retraced, successful
 

@@ -17,8 +17,8 @@ from flatland2d.scenes import INSET, SCENES, Setting
 from flatland2d.sensors import FILM
 from restir_ref.batch import Array, take
 from restir_ref.chance import Live
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import Path, Tracer, leaves, trace
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.shifts import shift_path
 from tests.transport.paths import RULES
 

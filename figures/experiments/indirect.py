@@ -12,9 +12,9 @@ from figures.experiments.split_light import IndirectIntegrals
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted
+from restir_ref.transport.baselines.restir_gi import RadianceIntegrals, Stored, keeps_radiance
 from restir_ref.transport.paths import RECONNECTION, Connectability, Leaf, Tree, leaves, trace
 from restir_ref.transport.record import record
-from restir_ref.transport.restir_gi import RadianceIntegrals, Stored, keeps_radiance
 from restir_ref.transport.restir_pt import ReconnectionAtX2
 from restir_ref.transport.subtrees import behind, of_leaf, one_leaf
 

@@ -24,9 +24,9 @@ from restir_ref.chance import Chance, Live
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import OFFLINE
 from restir_ref.restir import reuse_all
-from restir_ref.transport.path_reuse import TILE, TileIntegrals, not_shared, rest_of_tile
+from restir_ref.transport.baselines.path_reuse import TILE, TileIntegrals, not_shared, rest_of_tile
+from restir_ref.transport.baselines.restir_di import indirect_light
 from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer, trace
-from restir_ref.transport.restir_di import indirect_light
 from restir_ref.transport.restir_pt import PathIntegrals
 
 UNIT = 4

@@ -20,9 +20,9 @@ from flatland2d.motion import motion
 from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
+from restir_ref.transport.baselines.restir_gi import RadianceIntegrals
 from restir_ref.transport.counting import counted, rays
 from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
-from restir_ref.transport.restir_gi import RadianceIntegrals
 from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
 
 FRAMES = 20

@@ -19,9 +19,9 @@ from restir_ref.integrals import Pixels, Reservoirs, Shifted
 from restir_ref.loop import REAL_TIME, random_in_row
 from restir_ref.resampling import Candidate, select
 from restir_ref.restir import shade
+from restir_ref.transport.baselines.restir_di import DEBIASED, direct_light, indirect_light, light_integrals
 from restir_ref.transport.paths import Path, Tree, leaves, trace
 from restir_ref.transport.record import record
-from restir_ref.transport.restir_di import DEBIASED, direct_light, indirect_light, light_integrals
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.subtrees import of_leaf
 

@@ -23,8 +23,8 @@ from flatland2d.sensors import FILM, Pinhole
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.metrics import mape
+from restir_ref.transport.baselines.restir_di import indirect_light
 from restir_ref.transport.counting import rays
-from restir_ref.transport.restir_di import indirect_light
 from restir_ref.transport.restir_pt import PathIntegrals
 
 if TYPE_CHECKING:

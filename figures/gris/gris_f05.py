@@ -21,11 +21,11 @@ from flatland2d.space import PLANE
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.transport import materials as mat
-from restir_ref.transport.inversion import primary_sample, traced
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Path, Tracer, first_hit
+from restir_ref.transport.proofs.inversion import primary_sample, traced
+from restir_ref.transport.proofs.reading import extended_path, roughnesses
 from restir_ref.transport.rays import arrive
-from restir_ref.transport.reading import extended_path, roughnesses
 from restir_ref.transport.scene import scene
 from restir_ref.transport.shifts import shift_path
 from restir_ref.transport.vectors import normalize

@@ -10,7 +10,6 @@ times worse samplers.  The second one lies in the dark room beside a slit.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,12 +21,12 @@ from figures.report import style
 from flatland2d import SCENES
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance, Live
-from restir_ref.integrals import Pixels, Shifted
+from restir_ref.integrals import Pixels
 from restir_ref.loop import OFFLINE
 from restir_ref.mis import WEIGHTS
 from restir_ref.resampling import Candidate, Input, select, weigh
 from restir_ref.restir import initial, shade
-from restir_ref.transport.paths import RECONNECTION, Path, Tracer
+from restir_ref.transport.paths import RECONNECTION, Tracer
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,26 +62,11 @@ JUDGED = [("beside a slit, film", SPATIAL)]
 # ---------------------------------------------------------------- passes
 
 
-@dataclass(frozen=True, eq=False)
-class Kept(IndirectIntegrals):
-    """Indirect light whose shifts of one sample are traced once per target: inputs of one pixel share the answer."""
-
-    answers: dict[int, tuple[Path, Pixels, Shifted]] = field(default_factory=dict)
-
-    def shift(self, x: Path, index: Array, to: Pixels) -> Shifted:
-        """As for indirect light; answers about the last x stay, which comes in a new view each time."""
-        if any(of.u.base is not x.u.base for of, _, _ in self.answers.values()):
-            self.answers.clear()
-        if x.u.base is None or id(to) not in self.answers:
-            self.answers[id(to)] = (x, to, super().shift(x, index, to))
-        return self.answers[id(to)][2]
-
-
 def around(scene: str, middle: int, M: int, step: int, columns: int) -> list[Pixels]:
     """A film pixel, then those to its left and right, nearest first, in `columns` replicas."""
     setting, reach = SCENES[scene](), (M // 2) * step
     sensor = setting.pinhole(2 * reach + 1, middle - reach)
-    of = Kept(Tracer(setting.scene, sensor, setting.depth, RECONNECTION))
+    of = IndirectIntegrals(Tracer(setting.scene, sensor, setting.depth, RECONNECTION))
     offsets = [0, *(sign * k * step for k in range(1, M // 2 + 1) for sign in (-1, 1))]
     return [Pixels(of, np.full(columns, reach + offset)) for offset in offsets]
 

@@ -21,7 +21,7 @@ from flatland2d.scenes import SCENES as SCENES_BY_NAME
 from flatland2d.sensors import FILM
 from restir_ref.batch import Array
 from restir_ref.metrics import rel_mse
-from restir_ref.transport.restir_di import indirect_light
+from restir_ref.transport.baselines.restir_di import indirect_light
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture

@@ -20,7 +20,7 @@ from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.metrics import correlation, mape, tile_contrast
-from restir_ref.transport.path_reuse import TILE, path_reuse
+from restir_ref.transport.baselines.path_reuse import TILE, path_reuse
 from restir_ref.transport.restir_pt import PathIntegrals
 
 if TYPE_CHECKING:

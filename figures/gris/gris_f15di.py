@@ -30,9 +30,7 @@ from restir_ref.loop import REAL_TIME, random_in_row
 from restir_ref.metrics import mape
 from restir_ref.mis import Weights
 from restir_ref.restir import shade
-from restir_ref.transport.counting import rays
-from restir_ref.transport.paths import RECONNECTION, Tracer, Tree, first_hit, leaves, trace
-from restir_ref.transport.restir_di import (
+from restir_ref.transport.baselines.restir_di import (
     BIASED,
     DEBIASED,
     LightIntegrals,
@@ -40,6 +38,8 @@ from restir_ref.transport.restir_di import (
     indirect_light,
     light_integrals,
 )
+from restir_ref.transport.counting import rays
+from restir_ref.transport.paths import RECONNECTION, Tracer, Tree, first_hit, leaves, trace
 from restir_ref.transport.scene import Scene
 
 if TYPE_CHECKING:

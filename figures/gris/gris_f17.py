@@ -26,8 +26,8 @@ from restir_ref.integrals import Pixels, Shifted
 from restir_ref.loop import OFFLINE, spread_in_row
 from restir_ref.metrics import mape, rel_mse
 from restir_ref.restir import initial
+from restir_ref.transport.baselines.restir_di import indirect_light
 from restir_ref.transport.paths import RECONNECTION, trace
-from restir_ref.transport.restir_di import indirect_light
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

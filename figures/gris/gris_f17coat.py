@@ -20,9 +20,9 @@ from figures.gris.gris_f17 import rays_to
 from figures.report import style
 from flatland2d.scenes import matte
 from restir_ref.metrics import mape
+from restir_ref.transport.baselines.restir_di import indirect_light
 from restir_ref.transport.materials import Layer, Material, table
 from restir_ref.transport.paths import Tracer
-from restir_ref.transport.restir_di import indirect_light
 from restir_ref.transport.restir_pt import PathIntegrals
 
 if TYPE_CHECKING:

@@ -7,15 +7,11 @@ ones of the list farther, lamps farthest.  So a lamp in a wall shines, and from 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from restir_ref.batch import Array, take, total
 from restir_ref.transport.vectors import dot
-
-if TYPE_CHECKING:
-    from restir_ref.transport.scene import Scene
 
 AT_ONCE = 2**18
 """Pairs of facets whose boxes are compared at once."""
@@ -26,18 +22,23 @@ class Coincidence:
     """others (P,), primitive by primitive, those of p from first[p] to first[p + 1], (S + B + 1,).
 
     rank (S + B,)  how far each is moved towards its front
+    normals (d, S), maps (d, S, d), offsets (d, S)  of the facets
     """
 
     first: Array
     others: Array
     rank: Array
+    normals: Array
+    maps: Array
+    offsets: Array
 
 
-def coincidence(pairs: Array, emits: Array) -> Coincidence:
+def coincidence(pairs: Array, emits: Array, normals: Array, maps: Array, offsets: Array) -> Coincidence:
     """Of pairs (2, P) of facets and whether primitives emit (S + B,)."""
-    n = len(emits)
+    n, d = len(emits), len(normals)
     own, others = pairs.take(np.argsort(pairs[0], kind="stable"), axis=1)
-    return Coincidence(np.searchsorted(own, np.arange(n + 1)), others, np.arange(1, n + 1) + n * emits)
+    first, rank = np.searchsorted(own, np.arange(n + 1)), np.arange(1, n + 1) + n * emits
+    return Coincidence(first, others, rank, normals, maps.reshape(d, -1, d), offsets.reshape(d, -1))
 
 
 def coincident(corners: Array, maps: Array, offsets: Array, least: float) -> Array:
@@ -75,35 +76,35 @@ def _seen_from(maps: Array, offsets: Array, a: Array, v: Array, least: float) ->
     return (np.abs(at[-1]) <= least).all(axis=1), beyond.any(axis=0)
 
 
-def foremost(s: "Scene", x: Array, prim: Array, w: Array) -> Array:
+def foremost(c: Coincidence, x: Array, prim: Array, w: Array) -> Array:
     """The primitive that a ray along w (d, N) meets at x, of those that coincide with `prim` there; (N,)."""
-    first, found = s.coincidence.first, prim.copy()
-    crowded = np.flatnonzero(first.take(prim + 1) > first.take(prim))
+    if not c.others.size:
+        return prim
+    found = prim.copy()
+    crowded = np.flatnonzero(c.first.take(prim + 1) > c.first.take(prim))
     if len(crowded):
-        found[crowded] = _first_of_many(s, *take((x, prim, w), crowded))
+        found[crowded] = _first_of_many(c, *take((x, prim, w), crowded))
     return found
 
 
-def _first_of_many(s: "Scene", x: Array, prim: Array, w: Array) -> Array:
+def _first_of_many(c: Coincidence, x: Array, prim: Array, w: Array) -> Array:
     """`foremost`, by asking all."""
-    start, stop = s.coincidence.first.take(prim), s.coincidence.first.take(prim + 1)
-    found, height = prim, _height(s, prim, w)
+    start, stop = c.first.take(prim), c.first.take(prim + 1)
+    found, height = prim, _height(c, prim, w)
     for k in range(int((stop - start).max())):
-        other = np.where(start + k < stop, s.coincidence.others.take(start + k, mode="clip"), prim)
-        above = _height(s, other, w)
-        better = (above > height) & _covers(s, other, x)
+        other = np.where(start + k < stop, c.others.take(start + k, mode="clip"), prim)
+        above = _height(c, other, w)
+        better = (above > height) & _covers(c, other, x)
         found, height = np.where(better, other, found), np.where(better, above, height)
     return found
 
 
-def _height(s: "Scene", prim: Array, w: Array) -> Array:
+def _height(c: Coincidence, prim: Array, w: Array) -> Array:
     """How far facets are moved against the ray, (N,)."""
-    return -np.sign(dot(s.normals.take(prim, axis=-1), w)) * s.coincidence.rank.take(prim)
+    return -np.sign(dot(c.normals.take(prim, axis=-1), w)) * c.rank.take(prim)
 
 
-def _covers(s: "Scene", prim: Array, x: Array) -> Array:
+def _covers(c: Coincidence, prim: Array, x: Array) -> Array:
     """Whether the facet is there at x, a point of its plane; (N,)."""
-    d = s.space.d
-    slope, offset = s.maps.reshape(d, s.S, d)[:-1].take(prim, axis=1), s.offsets.reshape(d, s.S)[:-1].take(prim, axis=1)
-    b = np.einsum("knd,dn->kn", slope, x) + offset
+    b = np.einsum("knd,dn->kn", c.maps[:-1].take(prim, axis=1), x) + c.offsets[:-1].take(prim, axis=1)
     return np.asarray((b >= 0).all(axis=0) & (total([*b]) <= 1))

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from restir_ref.batch import Array, map_leaves, take, total
+from restir_ref.batch import Array, changed, joined, take, total
 from restir_ref.transport.materials import Vertex, lobe_shares
 from restir_ref.transport.paths import Path, Suffix, Tracer, leaves, light_leaf, trace
 from restir_ref.transport.rays import light_pdf, vertex
-from restir_ref.transport.shifts import Prefix, end, reconnect, replay
+from restir_ref.transport.shifts import reconnect, replay, shift_path
 from restir_ref.transport.vectors import normalize
 
 
@@ -65,22 +65,20 @@ def _goes_on(x: Path | Compact, i: Array) -> Array:
 def unpack(t: Tracer, x: Compact, pixel: Array) -> Path:
     """The path record again, by tracing the path in its own `pixel` (N,); numbers that nothing reads are 1/2."""
     known = _untraced(t, x)
-    prefix = replay(t, known, pixel, np.where(known.c > 0, known.c - 1, known.k))
     groups = [np.flatnonzero(known.c == c) for c in range(t.depth + 2)]
-    parts = [_traced(t, take(known, columns), take(prefix, columns)) for columns in groups if len(columns)]
-    order = np.argsort(np.concatenate(groups))
-    whole: Path = map_leaves(lambda *leaves: np.concatenate(leaves, axis=-1).take(order, axis=-1), *parts)
-    return whole
+    parts = [_traced(t, take(known, columns), pixel.take(columns)) for columns in groups if len(columns)]
+    return take(joined(parts), np.argsort(np.concatenate(groups)))
 
 
-def _traced(t: Tracer, x: Path, y: Prefix) -> Path:
+def _traced(t: Tracer, x: Path, pixel: Array) -> Path:
     """S and p_light from x_c on, F and A from the pixel on; all columns reconnect at one index."""
     c = int(x.c[0])
     if c == 0:
-        return replace(x, F=end(t, x, y)[0])
+        return changed(x, F=shift_path(t, x, pixel)[0].F)
+    y = replay(t, x, pixel)
     whole = _by_light(t, _by_hit(t, x, c), vertex(t.scene, x.z, x.prim, normalize(y.v.x - x.z)))
     F, A, _ = reconnect(t, whole, y)
-    return replace(whole, F=F, A=A)
+    return changed(whole, F=F, A=A)
 
 
 def _untraced(t: Tracer, x: Compact) -> Path:
@@ -134,6 +132,8 @@ def _by_light(t: Tracer, x: Path, z: Vertex) -> Path:
     if not len(ends):
         return x
     v = take(z, ends)
-    leaf, out[:, ends] = light_leaf(t, v, lobe_shares(t.scene.materials, v), x.u.take(ends, axis=-1), int(x.c[0]))
+    leaf, out[:, ends] = light_leaf(
+        t, v, lobe_shares(t.scene.materials, v), t.light_numbers(x.u.take(ends, axis=-1), int(x.c[0]))
+    )
     S[:, ends], p_light[ends] = leaf.bare, leaf.p_light
     return replace(x, S=S, p_light=p_light, out=out)

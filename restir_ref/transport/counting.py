@@ -5,9 +5,10 @@ renderer's cost is known, whatever the machine.
 """
 
 from collections import Counter
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, replace
 
 from restir_ref.batch import Array
+from restir_ref.transport.intersection import Surfaces
 from restir_ref.transport.scene import Scene
 
 CLOSEST = "closest-hit rays"
@@ -15,25 +16,31 @@ SHADOW = "shadow rays"
 
 
 @dataclass(frozen=True, eq=False)
-class CountedScene(Scene):
-    """The same scene; asked[CLOSEST] and asked[SHADOW] count rays, one per column."""
+class Counted:
+    """The same surfaces; asked[CLOSEST] and asked[SHADOW] count rays, one per column."""
 
-    asked: Counter[str] = field(default_factory=Counter)
+    surfaces: Surfaces
+    asked: Counter[str]
 
     def intersect(self, x: Array, w: Array) -> tuple[Array, Array]:
         """Distance and primitive, counted."""
         self.asked[CLOSEST] += x.shape[-1]
-        return super().intersect(x, w)
+        return self.surfaces.intersect(x, w)
 
     def visible(self, x: Array, y: Array) -> Array:
         """Whether nothing stands between x and y, counted."""
         self.asked[SHADOW] += x.shape[-1]
-        return super().visible(x, y)
+        return self.surfaces.visible(x, y)
+
+    def foremost(self, x: Array, prim: Array, w: Array) -> Array:
+        """What a ray meets first of what is in one place: no ray of its own."""
+        return self.surfaces.foremost(x, prim, w)
 
 
-def counted(scene: Scene, asked: Counter[str]) -> CountedScene:
-    """`scene`, counting into `asked`."""
-    return CountedScene(**{each.name: getattr(scene, each.name) for each in fields(Scene)}, asked=asked)
+def counted(scene: Scene, asked: Counter[str]) -> Scene:
+    """`scene`, counting into `asked`, and no longer into what it counted into before."""
+    plain = scene.surfaces.surfaces if isinstance(scene.surfaces, Counted) else scene.surfaces
+    return replace(scene, surfaces=Counted(plain, asked))
 
 
 def rays(asked: Counter[str]) -> int:

@@ -9,17 +9,15 @@ it, at any angle.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from restir_ref.batch import Array, ratio, total
-from restir_ref.transport.coincidence import foremost
+from restir_ref.transport.coincidence import Coincidence, foremost
 from restir_ref.transport.vectors import dot
-
-if TYPE_CHECKING:
-    from restir_ref.transport.scene import Scene
 
 CLEARANCE = 1e-10
 """Heights below this share of the scene's extent are 0."""
@@ -33,28 +31,78 @@ BLOCK = 2**15
 np.empty(3 * 2**20)
 
 
-def intersect(s: "Scene", x: Array, w: Array) -> tuple[Array, Array]:
-    """Distance t (N,) to the nearest surface along x + t w, and its primitive (N,); inf and 0 if there is none."""
-    near, prim = np.empty(x.shape[-1]), np.empty(x.shape[-1], dtype=int)
-    for part in _blocks(s, x.shape[-1]):
-        near[part], prim[part] = _nearest(s, x[:, part], w[:, part])
-    if s.coincidence.others.size:
-        hit = np.flatnonzero(near)
-        x, w = x.take(hit, axis=-1), w.take(hit, axis=-1)
-        prim[hit] = foremost(s, x + w / near[hit], prim[hit], w)
-    with np.errstate(divide="ignore"):
-        return 1 / np.abs(near), prim  # facets that were missed may have left -0
+class Surfaces(Protocol):
+    """What a scene asks where rays go; primitives are the S facets, then the B balls."""
+
+    def intersect(self, x: Array, w: Array) -> tuple[Array, Array]:
+        """Distance t (N,) to the nearest surface along x + t w, and its primitive (N,); inf and 0 if there is none."""
+
+    def visible(self, x: Array, y: Array) -> Array:
+        """Whether nothing stands between x and y, (N,); the same, to the last bit, as between y and x."""
+
+    def foremost(self, x: Array, prim: Array, w: Array) -> Array:
+        """The primitive that a ray along w meets at x, of those that coincide with `prim` there; (N,)."""
 
 
-def _blocks(s: "Scene", n: int) -> Iterator[slice]:
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """`Surfaces` by asking all of them at once.
+
+    maps (d S, d), offsets (d S, 1)  coordinates first, heights last
+    centres (d, B), radii (B, 1);  extent  of which CLEARANCE is a share
+    """
+
+    maps: Array
+    offsets: Array
+    centres: Array
+    radii: Array
+    extent: float
+    coincidence: Coincidence
+
+    @property
+    def d(self) -> int:
+        """The dimension."""
+        return int(self.maps.shape[1])
+
+    @property
+    def simplices(self) -> int:
+        """S + B."""
+        return len(self.maps) // self.d + self.radii.size
+
+    def intersect(self, x: Array, w: Array) -> tuple[Array, Array]:
+        """Distance and primitive, block by block."""
+        near, prim = np.empty(x.shape[-1]), np.empty(x.shape[-1], dtype=int)
+        for part in blocks(self.simplices, x.shape[-1]):
+            near[part], prim[part] = _nearest(self, x[:, part], w[:, part])
+        if self.coincidence.others.size:
+            hit = np.flatnonzero(near)
+            x, w = x.take(hit, axis=-1), w.take(hit, axis=-1)
+            prim[hit] = self.foremost(x + w / near[hit], prim[hit], w)
+        with np.errstate(divide="ignore"):
+            return 1 / np.abs(near), prim  # facets that were missed may have left -0
+
+    def visible(self, x: Array, y: Array) -> Array:
+        """Whether nothing stands between x and y, block by block."""
+        clear = np.empty(x.shape[-1], dtype=bool)
+        for part in blocks(self.simplices, x.shape[-1]):
+            clear[part] = ~_facets_between(self, x[:, part], y[:, part])
+            if self.radii.size:
+                clear[part] &= ~_balls_between(self, x[:, part], y[:, part])
+        return clear
+
+    def foremost(self, x: Array, prim: Array, w: Array) -> Array:
+        """By the order of the list and by what emits."""
+        return foremost(self.coincidence, x, prim, w)
+
+
+def blocks(simplices: int, n: int) -> Iterator[slice]:
     """Slices of the batch axis: BLOCK / S columns, or 256 if these are more, cut where S times that exceeds 4 BLOCK.
 
     Narrower ones would cost more by their number than they save in the cache.
 
     Hazard: BLAS rounds a lone column in another way, so cutting must not leave one.
     """
-    S = len(s.material)
-    wide, most = max(BLOCK // S, 256), max(4 * BLOCK // S, 3)
+    wide, most = max(BLOCK // simplices, 256), max(4 * BLOCK // simplices, 3)
     for at in range(0, n, wide):
         width = min(wide, n - at)
         parts = -(-width // most)
@@ -62,7 +110,7 @@ def _blocks(s: "Scene", n: int) -> Iterator[slice]:
         yield from (slice(*ends) for ends in pairwise(cuts))
 
 
-def _nearest(s: "Scene", x: Array, w: Array) -> tuple[Array, Array]:
+def _nearest(s: Matrices, x: Array, w: Array) -> tuple[Array, Array]:
     """1 / t of the nearest surface (n,), 0 if there is none, and its primitive (n,)."""
     near = _facet_nearness(s, x, w)
     if s.radii.size:
@@ -73,10 +121,10 @@ def _nearest(s: "Scene", x: Array, w: Array) -> tuple[Array, Array]:
     return nearest, prim * (nearest > 0)
 
 
-def _facet_nearness(s: "Scene", x: Array, w: Array) -> Array:
+def _facet_nearness(s: Matrices, x: Array, w: Array) -> Array:
     """1 / t of the crossing with each facet, 0 if it is missed; (S, n)."""
     *b, h = _coordinates(s, x)
-    *back, descent = (s.maps @ -w).reshape(s.space.d, s.S, -1)
+    *back, descent = (s.maps @ -w).reshape(s.d, -1, w.shape[-1])
     h[np.abs(h) <= CLEARANCE * s.extent] = np.inf
     near = np.asarray(descent / h)
     scaled = [b_k * near - back_k for b_k, back_k in zip(b, back, strict=True)]
@@ -86,14 +134,14 @@ def _facet_nearness(s: "Scene", x: Array, w: Array) -> Array:
     return near * hit
 
 
-def _coordinates(s: "Scene", x: Array) -> Array:
+def _coordinates(s: Matrices, x: Array) -> Array:
     """Coordinates and height of points x in all facets, (d, S, n)."""
     at = s.maps @ x
     at += s.offsets
-    return at.reshape(s.space.d, s.S, -1)
+    return at.reshape(s.d, -1, x.shape[-1])
 
 
-def _ball_nearness(s: "Scene", x: Array, w: Array) -> Array:
+def _ball_nearness(s: Matrices, x: Array, w: Array) -> Array:
     """1 / t of the first crossing with each ball, 0 if it is missed; (B, n).
 
     |x + t w - c|^2 = r^2 at t |w|^2 = along +- sqrt(along^2 + |w|^2 depth), with along = (c - x).w.
@@ -106,24 +154,14 @@ def _ball_nearness(s: "Scene", x: Array, w: Array) -> Array:
     return ratio(w2, far * ((far > 0) & (root2 > 0)))
 
 
-def _depth(s: "Scene", x: Array) -> tuple[Array, Array]:
+def _depth(s: Matrices, x: Array) -> tuple[Array, Array]:
     """To the balls' centres (d, B, n), and r^2 - |x - c|^2 (B, n): positive inside, 0 on a ball."""
     to = s.centres[:, :, None] - x[:, None]
     depth = s.radii**2 - dot(to, to)
     return to, depth * (np.abs(depth) > 2 * s.radii * CLEARANCE * s.extent)
 
 
-def visible(s: "Scene", x: Array, y: Array) -> Array:
-    """Whether nothing stands between x and y, (N,); the same, to the last bit, as between y and x."""
-    clear = np.empty(x.shape[-1], dtype=bool)
-    for part in _blocks(s, x.shape[-1]):
-        clear[part] = ~_facets_between(s, x[:, part], y[:, part])
-        if s.radii.size:
-            clear[part] &= ~_balls_between(s, x[:, part], y[:, part])
-    return clear
-
-
-def _facets_between(s: "Scene", x: Array, y: Array) -> Array:
+def _facets_between(s: Matrices, x: Array, y: Array) -> Array:
     """Whether heights have opposite signs and (b(x) h(y) - b(y) h(x)) / (h(y) - h(x)) is inside a facet; (n,)."""
     (*b_x, h_x), (*b_y, h_y) = _coordinates(s, x), _coordinates(s, y)
     least = CLEARANCE * s.extent
@@ -137,7 +175,7 @@ def _facets_between(s: "Scene", x: Array, y: Array) -> Array:
     return np.asarray(hidden.any(axis=0))
 
 
-def _balls_between(s: "Scene", x: Array, y: Array) -> Array:
+def _balls_between(s: Matrices, x: Array, y: Array) -> Array:
     """Whether the segment enters or leaves a ball, other than at its ends; (n,)."""
     (to_x, depth_x), (to_y, depth_y) = _depth(s, x), _depth(s, y)
     to = y - x

@@ -10,11 +10,11 @@ Primary numbers: the sensor's, then 2 d per vertex: lobe 1, direction d-1, light
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio
+from restir_ref.batch import Array, Block, entry, ratio
 from restir_ref.guards import whole
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
@@ -105,12 +105,15 @@ class Tracer:
         start, d = self._start(i), self.scene.space.d
         return u[start + 1 : start + d]
 
-    def light_numbers(self, u: Array, i: int) -> tuple[Array, Array]:
-        """The numbers of light sampling at x_i: pick (N,), point (d-1, N)."""
+    def light_numbers(self, u: Array, i: int | Array) -> tuple[Array, Array]:
+        """The numbers of light sampling at x_i: pick (N,), point (d-1, N); i may be an index for each column."""
         start, d = self._start(i), self.scene.space.d
-        return u[start + d], u[start + d + 1 : start + 2 * d]
+        if isinstance(start, int):
+            return u[start + d], u[start + d + 1 : start + 2 * d]
+        pick, *point = (entry(u, start + row) for row in range(d, 2 * d))
+        return pick, np.stack(point)
 
-    def _start(self, i: int) -> int:
+    def _start(self, i: Any) -> Any:
         return self.sensor.numbers + 2 * self.scene.space.d * (i - 1)
 
 
@@ -122,7 +125,7 @@ class Suffix(Tracer):
 
 
 @dataclass(frozen=True)
-class Path:
+class Path(Block):
     """A path, evaluated, with what its shift needs.  [GRIS 8.2]
 
     u (D, N)  primary sample; stale from the reconnection on
@@ -183,10 +186,10 @@ def scatter(t: Tracer, v: Vertex, u: Array, i: int) -> Scatter:
     return Scatter(lobe, P, space.to_world(v.n, local), np.where(lost, 0.0, weight), p, p_all)
 
 
-def light_leaf(t: Tracer, v: Vertex, P: Array, u: Array, i: int) -> tuple[Leaf, Array]:
-    """Light sampling at x_i: the leaf (i, NEE) and the direction to the light.  [GRIS Eq. 49]"""
+def light_leaf(t: Tracer, v: Vertex, P: Array, numbers: tuple[Array, Array]) -> tuple[Leaf, Array]:
+    """Light sampling at x_i with its `light_numbers`: the leaf (i, NEE), the direction to the light.  [GRIS Eq. 49]"""
     s = t.scene
-    light = sample_light(s, *t.light_numbers(u, i))
+    light = sample_light(s, *numbers)
     to = light.y - v.x
     r = np.maximum(norm(to), 1e-300)
     w = to / r
@@ -200,11 +203,11 @@ def light_leaf(t: Tracer, v: Vertex, P: Array, u: Array, i: int) -> tuple[Leaf, 
     return Leaf(f * bare * ratio(p_light, p_light + p_all), bare, p_light), w
 
 
-def hit_leaf(t: Tracer, v: Vertex, r: Array, at: Scatter) -> Leaf:
-    """The BSDF sample `at` has met v at distance r: the leaf (i, BSDF), zero unless v emits."""
+def hit_leaf(t: Tracer, v: Vertex, r: Array, p_all: Array) -> Leaf:
+    """A BSDF sample of density p_all has met v at distance r: the leaf (i, BSDF), zero unless v emits."""
     bare = emitted(t.scene, v)
     p_light = light_pdf(t.scene, v, r)
-    omega = np.where(at.p_all > 0, ratio(at.p_all, at.p_all + p_light), 1.0)  # delta lobes have no rival
+    omega = np.where(p_all > 0, ratio(p_all, p_all + p_light), 1.0)  # delta lobes, and sensors, have no rival
     return Leaf(bare * omega, bare, p_light)
 
 
@@ -238,11 +241,11 @@ def trace(t: Tracer, u: Array, pixel: Array) -> Tree:
     vertices, scatters, distances, lights, hits, throughputs = [v], [], [r], [], [], [T]
     for i in range(1, t.depth + 1):
         at = scatter(t, v, u, i)
-        lights.append(light_leaf(t, v, at.P, u, i))
+        lights.append(light_leaf(t, v, at.P, t.light_numbers(u, i)))
         v, r, met = arrive(t.scene, v.x, at.w)
         at = Scatter(at.lobe, at.P, at.w, at.weight * met, at.p, at.p_all)
         T = T * at.weight
-        hits.append(hit_leaf(t, v, r, at))
+        hits.append(hit_leaf(t, v, r, at.p_all))
         vertices.append(v)
         scatters.append(at)
         distances.append(r)

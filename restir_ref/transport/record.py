@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from restir_ref.batch import Array
+from restir_ref.batch import Array, entry
 from restir_ref.transport import materials as mat
 from restir_ref.transport.paths import Path, Tracer, Tree, connectable
 
@@ -49,26 +49,25 @@ def first_connectable(t: Tracer, tree: Tree) -> tuple[Array, Array]:
 def record(t: Tracer, tree: Tree, k: Array, nee: Array, F: Array) -> Path:
     """The path record of leaf (k, nee) (N,) of each column, with contribution F (C, N)."""
     by_hit, by_light = first_connectable(t, tree)
-    columns = np.arange(len(k))
-    c = np.where(nee, by_light[k, columns], by_hit[k, columns])
+    c = np.where(nee, entry(by_light, k), entry(by_hit, k))
     s = stacks(tree)
     before = np.maximum(c - 1, 0)
     through = (c > 0) & (c <= k) & ~(nee & (c == k))
     lights = np.stack([np.zeros_like(tree.u[: t.scene.space.d]), *(w for _, w in tree.lights)])
     inner = np.minimum(c, t.depth)
-    out = np.where(through, _at(s.w, inner), _at(lights, k))
-    A = _at(s.p, before) * _at(s.cos, c) / _at(s.r, c) ** (t.scene.space.d - 1)
-    A = np.where(c > 0, A * np.where(through, _at(s.p, inner), 1), 1)
+    out = np.where(through, entry(s.w, inner), entry(lights, k))
+    A = entry(s.p, before) * entry(s.cos, c) / entry(s.r, c) ** (t.scene.space.d - 1)
+    A = np.where(c > 0, A * np.where(through, entry(s.p, inner), 1), 1)
     S, p_light = _suffix(t, tree, s, k, nee, c)
     return Path(
         u=tree.u,
         k=k,
         nee=nee,
         c=c,
-        z=_at(s.x, c),
-        prim=_at(s.prim, c),
-        lobe_in=_at(s.lobe, before),
-        lobe_out=np.where(through, _at(s.lobe, inner), 0),
+        z=entry(s.x, c),
+        prim=entry(s.prim, c),
+        lobe_in=entry(s.lobe, before),
+        lobe_out=np.where(through, entry(s.lobe, inner), 0),
         out=out,
         S=S,
         p_light=p_light,
@@ -101,16 +100,16 @@ def _suffix(t: Tracer, tree: Tree, s: Stacks, k: Array, nee: Array, c: Array) ->
     light_end = _padded([leaf.end for leaf, _ in tree.lights])
     light_bare = _padded([leaf.bare for leaf, _ in tree.lights])
     hit_end, hit_bare = _padded([leaf.end for leaf in tree.hits]), _padded([leaf.bare for leaf in tree.hits])
-    end = np.where(nee, _at(light_end, k), _at(hit_end, k))
-    bare = np.where(nee, _at(light_bare, k), _at(hit_bare, k))
+    end = np.where(nee, entry(light_end, k), entry(hit_end, k))
+    bare = np.where(nee, entry(light_bare, k), entry(hit_bare, k))
     S = np.where(c < k, end, np.where(c == k, bare, 1.0))
     last = np.where(nee, k - 1, k)
     for i in range(1, t.depth + 1):
         S = S * np.where((i > c) & (i <= last), s.weight[i], 1.0)
     p_light = np.where(
         nee,
-        _at(_padded([leaf.p_light for leaf, _ in tree.lights]), k),
-        _at(_padded([leaf.p_light for leaf in tree.hits]), k),
+        entry(_padded([leaf.p_light for leaf, _ in tree.lights]), k),
+        entry(_padded([leaf.p_light for leaf in tree.hits]), k),
     )
     return S, p_light
 
@@ -118,9 +117,3 @@ def _suffix(t: Tracer, tree: Tree, s: Stacks, k: Array, nee: Array, c: Array) ->
 def _padded(parts: Sequence[Array]) -> Array:
     """Stack arrays with a copy of the first in front, so that index i is vertex i."""
     return np.stack([parts[0], *parts])
-
-
-def _at(stack: Array, i: Array) -> Array:
-    """stack[i[n], ..., n] for every column n."""
-    index = np.broadcast_to(i, (1, *stack.shape[1:]))
-    return np.asarray(np.take_along_axis(stack, index, axis=0)[0])

@@ -8,10 +8,10 @@ import numpy as np
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted
-from restir_ref.resampling import Candidate, select
 from restir_ref.transport.paths import Path, Tracer, leaves, trace
 from restir_ref.transport.record import record
 from restir_ref.transport.shifts import shift_path
+from restir_ref.transport.subtrees import of_leaf, one_leaf
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,13 +28,9 @@ class PathIntegrals:
     def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Path, Array]]:
         """One path tree, resampled to one of its leaves, which cover disjoint parts of the sample space."""
         tree = trace(self.tracer, chance.uniform((self.tracer.D, len(index))), index % self.n)
-        found = list(leaves(tree))
-        one = np.ones(len(index))
-        offered = [Candidate(np.full(len(index), i), F.mean(axis=0), one) for i, (_, _, F) in enumerate(found)]
-        chosen = select(offered, chance, one)
-        k, nee = np.array([k for k, _, _ in found]), np.array([nee for _, nee, _ in found])
-        F = np.take_along_axis(np.stack([F for _, _, F in found]), chosen.x[None, None], axis=0)[0]
-        yield record(self.tracer, tree, k[chosen.x], nee[chosen.x], F), chosen.W
+        leaf, W = one_leaf(tree, chance)
+        k, nee, F = zip(*leaves(tree), strict=True)
+        yield record(self.tracer, tree, np.array(k)[leaf], np.array(nee)[leaf], of_leaf(F, leaf)), W
 
     def target(self, index: Array, x: Path) -> Array:
         """p_hat = mean of F over channels, visibility and MIS weight included."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from restir_ref.batch import Array
-from restir_ref.transport import intersection
-from restir_ref.transport.coincidence import Coincidence, coincidence, coincident, foremost
+from restir_ref.transport.coincidence import coincidence, coincident
+from restir_ref.transport.intersection import CLEARANCE, Matrices, Surfaces
 from restir_ref.transport.materials import Material, Table, table
 from restir_ref.transport.space import Space
 
@@ -55,24 +55,22 @@ class Scene:
     """Everything a path can meet, as arrays; primitives are the S facets, then the B balls.
 
     corners (d, d, S) corner by corner, normals (d, S)
-    maps (d S, d), offsets (d S, 1)  coordinates first, heights last
     centres (d, B), radii (B, 1);  material (S + B,), emission (C, S + B), pdf_area (S + B,)
+    surfaces  answers what rays meet: whoever counts, lets light through walls, or knows a faster way puts it here
     """
 
     space: Space
     materials: Table
     corners: Array
     normals: Array
-    maps: Array
-    offsets: Array
     centres: Array
     radii: Array
     material: Array
     emission: Array
     pdf_area: Array
     lights: Lights
-    coincidence: Coincidence
     extent: float
+    surfaces: Surfaces
 
     @property
     def C(self) -> int:
@@ -86,16 +84,15 @@ class Scene:
 
     def intersect(self, x: Array, w: Array) -> tuple[Array, Array]:
         """Distance t (N,) to the nearest surface along x + t w, and its primitive (N,); inf and 0 if there is none."""
-        return intersection.intersect(self, x, w)
+        return self.surfaces.intersect(x, w)
 
     def visible(self, x: Array, y: Array) -> Array:
         """Whether nothing stands between x and y, (N,)."""
-        return intersection.visible(self, x, y)
+        return self.surfaces.visible(x, y)
 
     def meets(self, x: Array, y: Array, prim: Array) -> Array:
         """Whether a ray from x meets the primitive at y, of which y is a point, and nothing before; (N,)."""
-        clear = self.visible(x, y)
-        return clear & (foremost(self, y, prim, y - x) == prim) if self.coincidence.others.size else clear
+        return np.asarray(self.visible(x, y) & (self.surfaces.foremost(y, prim, y - x) == prim))
 
 
 def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], balls: Sequence[Ball] = ()) -> Scene:
@@ -116,23 +113,22 @@ def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], 
     radii = np.array([ball.radius for ball in balls], dtype=float).reshape(-1, 1)
     extent = _extent(np.concatenate([corners.reshape(-1, space.d).T, centres - radii.T, centres + radii.T], axis=1))
     maps, offsets = _maps(corners, normals)
-    pairs = coincident(corners, maps, offsets, intersection.CLEARANCE * extent)
+    pairs = coincident(corners, maps, offsets, CLEARANCE * extent)
     _check_lamps(pairs, normals, emission)
+    together = coincidence(pairs, emission.max(axis=0) > 0, normals.T.copy(), maps, offsets)
     return Scene(
         space,
         table(materials, C),
         np.moveaxis(corners, 0, -1).copy(),
-        normals.T.copy(),
-        maps,
-        offsets,
+        together.normals,
         centres,
         radii,
         np.array([facet.material for facet in facets] + [ball.material for ball in balls]),
         emission,
         pdf_area,
         _lights(corners, normals, emission, pdf_area, share),
-        coincidence(pairs, emission.max(axis=0) > 0),
         extent,
+        Matrices(maps, offsets, centres, radii, extent, together),
     )
 
 

@@ -5,11 +5,12 @@ differs.  In primary sample space the Jacobian is J = A(y) / A(x) with one numbe
 density with which primary samples produce the reconnection vertex and the direction leaving it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from restir_ref.batch import Array, pick, ratio, take, total, where
+from restir_ref.batch import Array, changed, head, part, pick, put, ratio, take, total
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import (
@@ -27,81 +28,84 @@ from restir_ref.transport.vectors import norm
 
 @dataclass(frozen=True)
 class Prefix:
-    """A replayed path up to its last free vertex y_s: the vertex, throughput T (C, N), and whether it is legal."""
+    """A replayed path up to its last free vertex y_s, which is on the light if a BSDF sample finds it.
+
+    v, r (N,), p_all (N,)  y_s, its distance from y_(s-1), and the density of that direction over all lobes
+    T (C, N), legal (N,)   the throughput that arrives there, and whether the path may
+    """
 
     v: Vertex
+    r: Array
+    p_all: Array
     T: Array
     legal: Array
 
 
 def shift_path(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
-    """The offset path in `pixel` (N,) of tracer t, and J (N,), 0 where undefined."""
-    s = np.where(x.c > 0, x.c - 1, x.k)
-    prefix = replay(t, x, pixel, s)
-    replayed, reconnected = x.c == 0, x.c > 0
-    F, A = np.zeros_like(x.F), np.ones_like(x.A)
-    legal = prefix.legal
-    for columns, finish in ((np.flatnonzero(reconnected & legal), reconnect), (np.flatnonzero(replayed & legal), end)):
-        if len(columns):
-            F_part, A_part, legal_part = finish(t, take(x, columns), take(prefix, columns))
-            F[:, columns], A[columns], legal[columns] = F_part, A_part, legal_part
-    J = np.where(legal, ratio(A, x.A), 0.0)
-    return replace(x, F=np.where(J > 0, F, 0.0), A=np.where(J > 0, A, 1.0)), J
+    """The offset path in `pixel` (N,) of tracer t, and J (N,), 0 where undefined.
+
+    Columns are sorted once by what follows their free part, and what follows is computed for slices.
+    """
+    replayed = x.c == 0
+    kinds = [np.flatnonzero(kind) for kind in (replayed & ~x.nee, replayed & x.nee, ~replayed)]
+    order, ends = np.concatenate(kinds), np.cumsum([0, *map(len, kinds)])
+    base = take(x, order)
+    prefix = replay(t, base, pixel.take(order))
+    F, A, J = np.zeros((t.scene.C, len(order))), np.ones(len(order)), np.zeros(len(order))
+    for finish, (start, stop) in zip((_hit_end, _light_end, reconnect), pairwise(ends), strict=True):
+        if start < stop:
+            here = slice(start, stop)
+            F_y, A_y, legal = finish(t, *part((base, prefix), here))
+            J_y = np.where(legal, ratio(A_y, base.A[here]), 0.0)
+            columns = order[here]
+            F[:, columns], A[columns], J[columns] = np.where(J_y > 0, F_y, 0.0), np.where(J_y > 0, A_y, 1.0), J_y
+    return changed(x, F=F, A=A), J
 
 
-def replay(t: Tracer, x: Path, pixel: Array, s: Array) -> Prefix:
+def replay(t: Tracer, x: Path, pixel: Array) -> Prefix:
     """Trace y_1 .. y_s with x's numbers; illegal where a pair connects before x's does."""
-    v, _, T = first_hit(t, x.u, pixel)
-    prefix = Prefix(v, T, T.any(axis=0) | (s == 0))
+    s = np.where(x.c > 0, x.c - 1, np.where(x.nee, x.k, x.k + 1))
+    v, r, T = first_hit(t, head(x, "u", t.sensor.numbers), pixel)
+    y = Prefix(v, r, np.zeros(len(s)), np.array(T), T.any(axis=0) | (x.k == 0))
     for i in range(1, int(s.max(initial=0))):
-        columns = np.flatnonzero((s > i) & prefix.legal)
+        columns = np.flatnonzero((s > i) & y.legal)
         if not len(columns):
             break
-        part = _step(t, take(x, columns), take(prefix, columns), i, take(s, columns))
-        prefix = _put(prefix, columns, part)
-    return prefix
+        put(y, columns, _step(t, *take((x, y), columns), i))
+    return y
 
 
-def _step(t: Tracer, x: Path, y: Prefix, i: int, s: Array) -> Prefix:
+def _step(t: Tracer, x: Path, y: Prefix, i: int) -> Prefix:
     """From y_i to y_(i+1), and the test that they must not connect."""
-    table = t.scene.materials
     at = scatter(t, y.v, x.u, i)
     v, r, met = arrive(t.scene, y.v.x, at.w)
-    P = mat.lobe_shares(table, v)
-    lobe = np.where((i + 1 == s) & (x.c > 0), x.lobe_in, mat.choose_lobe(P, t.lobe_number(x.u, i + 1)))
-    light_end = (i + 1 == s) & (x.c == 0) & x.nee
-    rough = np.where(light_end, mat.roughest(table, v), mat.lobe_roughness(table, v, lobe))
-    early = connectable(t.rule, mat.lobe_roughness(table, y.v, at.lobe), rough, r)
+    by_hit = (x.c == 0) & ~x.nee & (x.k == i)
+    far = np.where(by_hit, 1.0, _roughness_of_y(t, x, v, i + 1)) if i < t.depth else np.ones(len(r))
+    early = connectable(t.rule, mat.lobe_roughness(t.scene.materials, y.v, at.lobe), far, r)
     T = y.T * at.weight
-    return Prefix(v, T, met & ~early & T.any(axis=0))
+    return Prefix(v, r, at.p_all, T, met & ~early & (T.any(axis=0) | by_hit))
 
 
-def end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
-    """The last steps of pure replay: F, A = 1, and whether the end is legal."""
-    F, legal = np.zeros_like(x.F), y.legal.copy()
-    for k in np.unique(x.k):
-        for nee in (False, True):
-            columns = np.flatnonzero((x.k == k) & (x.nee == nee))
-            if len(columns):
-                finish = _light_end if nee else _hit_end
-                F[:, columns], legal[columns] = finish(t, take(x, columns), take(y, columns), int(k))
-    return F, np.ones_like(x.A), legal
+def _roughness_of_y(t: Tracer, x: Path, v: Vertex, i: int) -> Array:
+    """Roughness that judges y_i: of the lobe that will leave it, its roughest before light sampling."""
+    table = t.scene.materials
+    lobe = np.where(x.c == i + 1, x.lobe_in, mat.choose_lobe(mat.lobe_shares(table, v), t.lobe_number(x.u, i)))
+    by_light = (x.c == 0) & x.nee & (x.k == i)
+    return np.where(by_light, mat.roughest(table, v), mat.lobe_roughness(table, v, lobe))
 
 
-def _light_end(t: Tracer, x: Path, y: Prefix, k: int) -> tuple[Array, Array]:
-    leaf, _ = light_leaf(t, y.v, mat.lobe_shares(t.scene.materials, y.v), x.u, k)
-    return y.T * leaf.end, np.ones(len(x.k), dtype=bool)
+def _hit_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
+    """A BSDF sample has met the light: F, A = 1, and whether it is legal."""
+    return y.T * hit_leaf(t, y.v, y.r, y.p_all).end, np.ones_like(y.r), y.legal
 
 
-def _hit_end(t: Tracer, x: Path, y: Prefix, k: int) -> tuple[Array, Array]:
-    """A BSDF sample from y_k onto a light, which must not be connectable."""
-    if k == 0:
-        return y.T * emitted(t.scene, y.v), np.ones(len(x.k), dtype=bool)
-    at = scatter(t, y.v, x.u, k)
-    v, r, met = arrive(t.scene, y.v.x, at.w)
-    rough = mat.lobe_roughness(t.scene.materials, y.v, at.lobe)
-    early = connectable(t.rule, rough, np.ones(len(x.k)), r)
-    return y.T * at.weight * hit_leaf(t, v, r, at).end, met & ~early
+def _light_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
+    """Light sampling from y_k: F, A = 1, and whether it is legal."""
+    F, legal = np.zeros_like(y.T), np.flatnonzero(y.legal)
+    base, at = take((x, y), legal)
+    leaf, _ = light_leaf(t, at.v, mat.lobe_shares(t.scene.materials, at.v), t.light_numbers(base.u, base.k))
+    F[:, legal] = at.T * leaf.end
+    return F, np.ones_like(y.r), y.legal
 
 
 def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
@@ -115,7 +119,7 @@ def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     local = space.to_local(y.v.n, w)
     weight, p, p_all = mat.scatter_lobe(table, space, y.v, P, x.lobe_in, local)
     far = _roughness_of_z(t, x, z)
-    legal = connectable(t.rule, mat.lobe_roughness(table, y.v, x.lobe_in), far, r) & (p > 0)
+    legal = y.legal & connectable(t.rule, mat.lobe_roughness(table, y.v, x.lobe_in), far, r) & (p > 0)
     p_out, E = _beyond(t, x, z, p_all, r)
     A = p * z.o[-1] / r ** (space.d - 1) * p_out
     legal &= (A > 0) & (np.minimum(np.abs(local[-1]), z.o[-1]) > GRAZING)
@@ -149,12 +153,3 @@ def _beyond(t: Tracer, x: Path, z: Vertex, p_all_y: Array, r: Array) -> tuple[Ar
     at_light, at_last = x.c > x.k, x.nee & (x.c == x.k)
     p_out = np.where(at_light | at_last, 1.0, p)
     return p_out, np.where(at_light, seen, np.where(at_last, lit, through))
-
-
-def _put(whole: Prefix, columns: Array, part: Prefix) -> Prefix:
-    """`whole` with `part` in the given columns."""
-    position = np.zeros(len(whole.legal), dtype=int)
-    position[columns] = np.arange(len(columns))
-    mask = np.zeros(len(whole.legal), dtype=bool)
-    mask[columns] = True
-    return where(mask, take(part, position), whole)

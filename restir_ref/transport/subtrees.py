@@ -1,11 +1,12 @@
 """Parts of a traced tree: one of its leaves, or everything behind its first vertex."""
 
+from collections.abc import Sequence
 from itertools import accumulate
 from operator import mul
 
 import numpy as np
 
-from restir_ref.batch import Array
+from restir_ref.batch import Array, entry
 from restir_ref.chance import Chance
 from restir_ref.resampling import Candidate, select
 from restir_ref.transport.paths import Tree, leaves
@@ -25,6 +26,6 @@ def one_leaf(tree: Tree, chance: Chance) -> tuple[Array, Array]:
     return chosen.x, chosen.W
 
 
-def of_leaf(values: list[Array], leaf: Array) -> Array:
+def of_leaf(values: Sequence[Array], leaf: Array) -> Array:
     """values[leaf[n]][..., n] for every column n: what belongs to the chosen leaves."""
-    return np.asarray(np.take_along_axis(np.stack(values), np.broadcast_to(leaf, (1, *values[0].shape)), axis=0)[0])
+    return entry(np.stack(values), leaf)

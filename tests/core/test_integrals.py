@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from restir_ref import integrals as doors
 from restir_ref import resampling
 from restir_ref.batch import Array
 from restir_ref.decorrelation import Blue, Move, mutate
@@ -246,7 +247,7 @@ class Buffered(Wrapped):
 
 
 def buffered(what: str, integrals=TOY) -> Buffered:
-    return Buffered(integrals, what, np.empty(N))
+    return Buffered(integrals, what, np.empty(4 * N))
 
 
 def mutated(integrals):
@@ -285,7 +286,7 @@ def bias_of_buffer(what: str) -> float:
     kind = int if what.startswith("samples") else float
 
     def loop(index, chance):
-        here = Pixels(Buffered(scene.now, what, np.empty(len(index), dtype=kind)), index)
+        here = Pixels(Buffered(scene.now, what, np.empty(4 * len(index), dtype=kind)), index)
         near = [offset(here.of, index, by) for by in (1, 2)]  # type: ignore[arg-type]
         return spatial(initial(here, chance), here, near, chance, mis=TALBOT)
 
@@ -295,7 +296,8 @@ def bias_of_buffer(what: str) -> float:
 @pytest.mark.parametrize("what", ["target()", "samples from shift()", "Jacobians from shift()"])
 def test_without_the_refusal_a_buffer_that_is_used_again_is_biased(what, monkeypatch):
     assert bias_of_buffer("nothing") < 1e-13
-    monkeypatch.setattr(resampling, "apart", lambda one, other, what: None)
+    for module in (resampling, doors):
+        monkeypatch.setattr(module, "apart", lambda one, other, what: None)
     assert bias_of_buffer(what) > 0.4
 
 

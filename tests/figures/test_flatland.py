@@ -29,9 +29,9 @@ from restir_ref.integrals import Pixels
 from restir_ref.loop import REAL_TIME, random_in_row, spread_in_row
 from restir_ref.metrics import tile_contrast
 from restir_ref.restir import initial, spatial
+from restir_ref.transport.baselines.restir_di import indirect_light
 from restir_ref.transport.counting import CLOSEST, SHADOW, counted
 from restir_ref.transport.paths import Tracer, radiance, trace
-from restir_ref.transport.restir_di import indirect_light
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import scene
 from tests.core.stubs import live

@@ -19,8 +19,8 @@ from flatland2d import SCENES
 from flatland2d.gbuffer import gbuffer
 from flatland2d.sensors import FILM
 from restir_ref.batch import Array
+from restir_ref.transport.baselines.restir_gi import RadianceIntegrals
 from restir_ref.transport.paths import leaves, trace
-from restir_ref.transport.restir_gi import RadianceIntegrals
 from restir_ref.transport.vectors import norm
 from tests.core.stubs import live
 

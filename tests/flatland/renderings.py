@@ -19,8 +19,8 @@ from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import Preset, frame, random_in_row, spread_in_row
 from restir_ref.restir import initial, shade, spatial, temporal
 from restir_ref.transport.paths import RECONNECTION, Tracer
+from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.restir_pt import PathIntegrals
-from restir_ref.transport.zoo import TRANSPORT_BUGS
 from tests.transport.paths import HYBRID
 
 RULES = {"hybrid": HYBRID, "reconnection": RECONNECTION}

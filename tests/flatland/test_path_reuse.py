@@ -11,12 +11,12 @@ from flatland2d import PLANE, SCENES, Pinhole
 from flatland2d.scenes import LAMP, chain, matte, room
 from restir_ref.batch import Array
 from restir_ref.chance import Live
-from restir_ref.transport import path_reuse as module
+from restir_ref.transport.baselines import path_reuse as module
+from restir_ref.transport.baselines.path_reuse import TILE, Shared, TileIntegrals, not_shared, path_reuse, shareable
 from restir_ref.transport.counting import SHADOW, counted
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.materials import Layer, Material
-from restir_ref.transport.path_reuse import TILE, Shared, TileIntegrals, not_shared, path_reuse, shareable
 from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.scene import Facet
 from restir_ref.transport.scene import scene as compiled
 from restir_ref.transport.shifts import shift_path

@@ -14,8 +14,8 @@ from flatland2d.fluence import direct, fluence, fluence_map
 from flatland2d.scenes import FURNACE_ALBEDO
 from flatland2d.tone import decoded, encoded, exposure, tone, untone
 from restir_ref.batch import take
-from restir_ref.transport.inversion import traced
-from restir_ref.transport.paths import RECONNECTION, Tracer, leaves, radiance, trace
+from restir_ref.transport.paths import RECONNECTION, REPLAY, Tracer, leaves, radiance, trace
+from restir_ref.transport.proofs.inversion import traced
 from tests.core.stubs import live
 from tests.transport.paths import HYBRID, RULES
 
@@ -263,12 +263,43 @@ def test_a_shift_picture_shows_the_vertices_of_both_paths(rule):
     assert {"$x_1$", "$y_1$"} <= names
 
 
-def test_full_vertices_are_the_rough_ones():
-    t = gris_f05.tracer(HYBRID)
+FULL = {"replay": [False] * 4, "hybrid": [False, False, True, True], "reconnection": [True] * 4}
+
+
+@pytest.mark.parametrize("shift", FULL)
+def test_full_vertices_are_those_connectable_under_the_rule(shift):
+    t = gris_f05.tracer({"replay": REPLAY, "hybrid": HYBRID, "reconnection": RECONNECTION}[shift])
     p = shift_pictures.pair(t, gris_f05.by_hand(t, 4), gris_f05.PIXEL, gris_f05.PIXEL + 60)
     ax = drawn(shift_pictures.shift_picture, gris_f05.corridor(), p)
     full = {tuple(c.get_offsets()[0]): c.get_facecolor()[0].tolist() != [1, 1, 1, 1] for c in marks(ax)}
-    assert [full[tuple(x)] for x in p.x.x[1:5, :, 0]] == [False, False, True, True]
+    assert [full[tuple(x)] for x in p.x.x[1:5, :, 0]] == FULL[shift]
+
+
+def test_a_legend_says_connectable_and_not_rough():
+    t = gris_f05.tracer(HYBRID)
+    p = shift_pictures.pair(t, gris_f05.by_hand(t, 4), gris_f05.PIXEL, gris_f05.PIXEL + 60)
+    _, words = drawn(shift_pictures.shift_picture, gris_f05.corridor(), p).get_legend_handles_labels()
+    assert {"connectable by this rule", "not connectable by it", "on a light"} <= set(words)
+    assert not [each for each in words if "rough vertex" in each or "smooth" in each]
+
+
+def room_at_the_right(words):
+    """Pixels between the longest words of F05's legend, some of them replaced, and the edge of the picture."""
+    with style.context():
+        picture = gris_f05.draw({})
+        (legend,) = [ax.get_legend() for ax in picture.axes if ax.get_legend()]
+        for text in legend.get_texts():
+            text.set_text(words.get(text.get_text(), text.get_text()))
+        picture.draw_without_rendering()
+        return picture.bbox.x1 - max(text.get_window_extent().x1 for text in legend.get_texts())
+
+
+def test_the_words_of_a_legend_stay_inside_the_picture():
+    assert room_at_the_right({}) > 0
+
+
+def test_a_legend_of_longer_words_would_be_cut():
+    assert room_at_the_right({"connectable by this rule": "connectable under this rule"}) < 0
 
 
 def marks(ax):

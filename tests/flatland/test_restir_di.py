@@ -17,9 +17,7 @@ from restir_ref.integrals import Pixels
 from restir_ref.loop import random_in_row
 from restir_ref.mis import Weights
 from restir_ref.restir import initial, shade
-from restir_ref.transport.materials import Layer, Material
-from restir_ref.transport.paths import RECONNECTION, Tracer, Tree, first_hit, leaves, radiance, trace
-from restir_ref.transport.restir_di import (
+from restir_ref.transport.baselines.restir_di import (
     BIASED,
     CANDIDATES,
     DEBIASED,
@@ -29,6 +27,8 @@ from restir_ref.transport.restir_di import (
     light_integrals,
     lit,
 )
+from restir_ref.transport.materials import Layer, Material
+from restir_ref.transport.paths import RECONNECTION, Tracer, Tree, first_hit, leaves, radiance, trace
 from restir_ref.transport.scene import scene as compiled
 from tests.flatland.truths import radiosity
 

@@ -14,9 +14,9 @@ from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import random_in_row
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, shade, spatial, temporal
-from restir_ref.transport import restir_gi
+from restir_ref.transport.baselines import restir_gi
+from restir_ref.transport.baselines.restir_gi import RadianceIntegrals, keeps_radiance
 from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit
-from restir_ref.transport.restir_gi import RadianceIntegrals, keeps_radiance
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.vectors import norm
 from tests.flatland.truths import radiosity

@@ -10,8 +10,8 @@ from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, shade, spatial, temporal
+from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.restir_pt import PathIntegrals
-from restir_ref.transport.zoo import TRANSPORT_BUGS
 from tests.flatland.probes import PROBES, probes
 from tests.flatland.renderings import (
     RULES,

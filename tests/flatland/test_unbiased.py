@@ -14,9 +14,9 @@ from restir_ref.loop import OFFLINE, random_in_row
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, shade, spatial
 from restir_ref.transport.paths import Path, radiance, trace
+from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
+from restir_ref.transport.proofs.zoo.domains import Refused
 from restir_ref.transport.restir_pt import PathIntegrals
-from restir_ref.transport.zoo import TRANSPORT_BUGS
-from restir_ref.transport.zoo.domains import Refused
 from tests.flatland.renderings import (
     LOOPS,
     MATRIX,

@@ -7,9 +7,8 @@ import pytest
 
 from figures.claims.criteria import Outcome
 from figures.claims.figure import Claim, undeclared, verdict_of
-from figures.experiments.split_light import IndirectIntegrals
 from figures.gris import gris_f07flat, gris_f09flat
-from figures.gris.gris_f07flat import Kept, around, grouped, one_pass, realised, window_of
+from figures.gris.gris_f07flat import around, grouped, one_pass, realised, window_of
 from restir_ref.batch import Array
 from restir_ref.integrals import Pixels
 from restir_ref.mis import WEIGHTS
@@ -45,26 +44,6 @@ def test_a_proper_weights_estimate_is_sum_w(mis) -> None:
     inputs, window = inputs_of(2, 40)
     estimate, w = one_pass(inputs, window[0], mis, live())
     np.testing.assert_allclose(estimate, w, rtol=1e-12)
-
-
-def test_a_kept_shift_is_the_shift_and_is_traced_once() -> None:
-    here, near, far = around("cornell", 1024, 3, 10, 50)
-    X = initial(here, live()).x
-    assert isinstance(here.of, Kept)
-    plain = IndirectIntegrals(here.of.tracer)
-    for to in (near, far, near):
-        y, expected = here.of.shift(X, here.index, to), plain.shift(X, here.index, to)
-        np.testing.assert_array_equal(y.J, expected.J)
-        np.testing.assert_array_equal(y.x.F, expected.x.F)
-    assert here.of.shift(X, here.index, near) is here.of.shift(X, here.index, near)
-
-
-def test_a_kept_shift_is_not_that_of_another_sample() -> None:
-    here, near, _ = around("cornell", 1024, 3, 10, 50)
-    X, Y = (initial(here, live()).x for _ in range(2))
-    first = here.of.shift(X, here.index, near)
-    assert here.of.shift(Y, here.index, near) is not first
-    assert here.of.shift(X, here.index, near) is not first
 
 
 @pytest.mark.claims("GRIS-F08", part="what the windows contain")

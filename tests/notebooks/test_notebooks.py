@@ -1,11 +1,10 @@
 """Every notebook is clean, runs from top to bottom in this process, and ends with the facts that it tells."""
 
 import json
-import sys
 
 import pytest
 
-from notebooks import one_dimension, show
+from notebooks import pages
 from tests.checkout import ROOT
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -15,10 +14,6 @@ LONGEST = 14
 
 def read(path):
     return json.loads(path.read_text(encoding="utf-8"))
-
-
-def code(notebook):
-    return ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
 
 
 def faults(path):
@@ -40,12 +35,15 @@ def faults(path):
             yield f"{cell['id']} is too long"
 
 
-def run(notebook):
-    """The names that a notebook leaves behind."""
-    names = {"__name__": "notebook"}
-    for number, source in enumerate(code(notebook)):
-        exec(compile(source, f"code cell {number}", "exec"), names)
-    return names
+def run(path):
+    """The names that a notebook leaves behind, and what it prints; every picture and table is drawn."""
+    names, printed = {"__name__": "notebook"}, []
+    for cell in pages.cells(path):
+        if cell.kind == "code":
+            shown = pages.run(cell.source, names, cell.id)
+            assert all(map(repr, shown))
+            printed += [each for each in shown if isinstance(each, str)]
+    return names, "".join(printed)
 
 
 every_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
@@ -78,7 +76,7 @@ def test_a_spoiled_notebook_is_noticed(tmp_path, spoil):
 
 
 def test_from_ris_to_gris_tells_the_truth():
-    names = run(read(NOTEBOOKS[0]))
+    names, _ = run(NOTEBOOKS[0])
     plain, truth = names["plain"], names["truth"]
     assert abs(plain.mean() - truth) < 4 * plain.std() / 100 < 0.05 * truth
     assert names["without"].mean() == pytest.approx(1, abs=0.01)
@@ -89,22 +87,22 @@ def test_from_ris_to_gris_tells_the_truth():
 
 
 def test_is_my_estimator_unbiased_tells_the_truth():
-    names = run(read(NOTEBOOKS[1]))
+    names, _ = run(NOTEBOOKS[1])
     assert "one seed for two passes" in str(names["hidden"])
     assert names["verdict"].startswith("Unbiased")
     assert names["found"].startswith("Biased")
     assert [name for name, words in names["family"].items() if not words.startswith("Unbiased")] == ["constant"]
 
 
-def test_find_the_bug_runs_and_gives_nothing_away(capsys):
-    names = run(read(NOTEBOOKS[2]))
+def test_find_the_bug_runs_and_gives_nothing_away():
+    names, printed = run(NOTEBOOKS[2])
     assert list(names["suspects"]) == list("ABCDEF")
-    shown = capsys.readouterr().out + str(names["suspects"])
+    shown = printed + str(names["suspects"])
     assert not [name for name in names["lab"].names() if name in shown]
 
 
 def test_shift_mappings_you_can_see_tells_the_truth():
-    names = run(read(NOTEBOOKS[3]))
+    names, _ = run(NOTEBOOKS[3])
     assert {shift: pair.c for shift, pair in names["pairs"].items()} == {"replay": 0, "reconnection": 2, "hybrid": 4}
     kept = {shift: pair.J * pair.gain for shift, pair in names["pairs"].items()}
     assert kept["reconnection"] < 0.02
@@ -112,51 +110,12 @@ def test_shift_mappings_you_can_see_tells_the_truth():
     assert max(error for error, _ in names["back"].values()) < 1e-9
 
 
-def test_restir_pt_frame_by_frame_tells_the_truth(capsys):
-    names = run(read(NOTEBOOKS[4]))
+def test_restir_pt_frame_by_frame_tells_the_truth():
+    names, printed = run(NOTEBOOKS[4])
     initial, spatial, second = names["lit"].values()
     assert initial < 0.1
     assert 0.2 < spatial < second / 2
     assert (names["Y"].c == 4).all()
     assert (names["Z"].c == 20).all()
-    assert "pixels with light" in capsys.readouterr().out
+    assert "pixels with light" in printed
     assert 0.8 < names["film"].seen[1:].mean() < 1
-
-
-# ---------------------------------------------------------------- controls
-
-
-def png(picture):
-    return picture[1:4] == b"PNG"
-
-
-def test_a_picture_is_shown_as_png_in_the_house_style():
-    assert png(show.show(one_dimension.shift)._repr_png_())
-
-
-def test_a_control_redraws_the_picture():
-    pytest.importorskip("ipywidgets", reason="needs ipywidgets: pip install '.[notebooks]'")
-    box = show.explore(one_dimension.frozen, cap=["1", "none"])
-    cap, image = box.children
-    before = image.value
-    cap.value = "none"
-    assert png(before)
-    assert png(image.value)
-    assert image.value != before == show.show(one_dimension.frozen, "1").png
-
-
-def test_numbers_slide_in_order_from_the_first_one_given():
-    pytest.importorskip("ipywidgets", reason="needs ipywidgets: pip install '.[notebooks]'")
-    slider, _ = show.explore(one_dimension.ris, M=[4, 1, 2]).children
-    assert (slider.options, slider.value) == ((1, 2, 4), 4)
-
-
-def test_without_widgets_the_first_setting_is_shown(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ipywidgets", None)
-    assert show.explore(one_dimension.frozen, cap=["1", "none"]) == show.show(one_dimension.frozen, "1")
-
-
-def test_a_table_is_text_and_html():
-    table = show.Table(["a", "b"], [("x < y", 1)])
-    assert str(table) == "a      b\nx < y  1"
-    assert "x &lt; y" in table._repr_html_()

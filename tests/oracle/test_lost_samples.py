@@ -14,6 +14,7 @@ from restir_ref.oracle.scenes import paired
 from restir_ref.oracle.selected import selected
 from restir_ref.resampling import Input, gris
 from restir_ref.restir import initial
+from tests.core.stubs import live
 
 pytestmark = pytest.mark.kernel
 
@@ -56,3 +57,14 @@ def test_weights_that_promise_less_lose_it(mis) -> None:
 @pytest.mark.parametrize("mis", NEEDING_NOBODY.values(), ids=NEEDING_NOBODY)
 def test_nothing_is_lost_where_the_other_input_covers_all(mis) -> None:
     assert with_confidences(1, 0, mis) == pytest.approx(4)
+
+
+@pytest.mark.parametrize("mis", NEEDING_NOBODY.values(), ids=NEEDING_NOBODY)
+def test_an_input_that_is_not_there_loses_nothing_wherever_its_sample_is(mis) -> None:
+    """Pixel 1 is dark in cell 3, where the sample of the missing input lies: W = 0 and c = 0, as `NOWHERE`."""
+    here, one = Pixels(mostly_own(), np.array([1])), np.ones(1)
+    inputs = [
+        Input(Reservoirs(np.array([0]), one, one), here),
+        Input(Reservoirs(np.array([3]), 0 * one, 0 * one), here),
+    ]
+    assert gris(inputs, here, mis, live()).W == 1

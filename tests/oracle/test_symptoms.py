@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from restir_ref.oracle.zoo.page import SECTIONS, Entry, pieces
-from restir_ref.transport.zoo import TRANSPORT_BUGS
-from restir_ref.transport.zoo.page import section
+from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
+from restir_ref.transport.proofs.zoo.page import section
 from tests.checkout import ROOT
 from tests.oracle.pinned import ALL, looked_up
 
@@ -37,7 +37,7 @@ def test_poor_words_are_noticed(part, words) -> None:
 
 
 def test_the_index_of_symptoms_is_up_to_date() -> None:
-    """If not: python -m restir_ref.transport.zoo > docs/symptoms.md."""
+    """If not: python -m restir_ref.transport.proofs.zoo > docs/symptoms.md."""
     text = (ROOT / "docs" / "symptoms.md").read_text(encoding="utf-8")
     assert text == "".join([*pieces([looked_up(name) for name in ALL]), *section([*TRANSPORT_BUGS.values()])])
     assert [text.count(f"## {title}\n") for title in SECTIONS] == [1] * len(SECTIONS)

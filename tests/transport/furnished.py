@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from restir_ref.batch import Array
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import Connectability, Tracer
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.scene import Ball, scene
 from restir_ref.transport.shifts import shift_path
 from restir_ref.transport.space import Space

@@ -6,8 +6,8 @@ import numpy as np
 
 from flatland2d.scenes import Setting
 from restir_ref.batch import Array, take
-from restir_ref.transport.inversion import primary_sample, traced
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Path, Tracer
+from restir_ref.transport.proofs.inversion import primary_sample, traced
 from restir_ref.transport.shifts import shift_path
 
 HYBRID = Connectability(0.2, 0.02)

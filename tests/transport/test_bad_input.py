@@ -11,9 +11,9 @@ from restir_ref.gradient import gap
 from restir_ref.guards import whole
 from restir_ref.integrals import Pixels, Shifted
 from restir_ref.restir import initial
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.materials import Layer, Material, table
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Tracer, radiance, trace
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Ball, Facet, Scene, scene
 from restir_ref.transport.shifts import shift_path

@@ -17,13 +17,13 @@ from restir_ref.integrals import Pixels
 from restir_ref.loop import random_in_row
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, shade, spatial
-from restir_ref.transport import path_reuse as module
+from restir_ref.transport.baselines import path_reuse as module
+from restir_ref.transport.baselines.path_reuse import path_reuse
+from restir_ref.transport.baselines.restir_di import LightIntegrals, LightSample, visibility
+from restir_ref.transport.baselines.restir_gi import RadianceIntegrals
 from restir_ref.transport.materials import evaluate_all, lobe_shares
-from restir_ref.transport.path_reuse import path_reuse
 from restir_ref.transport.paths import RECONNECTION, Tracer, trace
 from restir_ref.transport.rays import LightPoint, sample_light
-from restir_ref.transport.restir_di import LightIntegrals, LightSample, visibility
-from restir_ref.transport.restir_gi import RadianceIntegrals
 from restir_ref.transport.space import Space
 from restir_ref.transport.vectors import norm
 from tests.transport.rooms import room, simplex

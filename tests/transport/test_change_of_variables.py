@@ -20,10 +20,10 @@ from restir_ref.integrals import Pixels, shifted
 from restir_ref.loop import random_in_row
 from restir_ref.restir import initial
 from restir_ref.transport.paths import Path
+from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS, WRONG_SHIFTS, TransportBug
+from restir_ref.transport.proofs.zoo.bug import CHECKS as ZOO_CHECKS
+from restir_ref.transport.proofs.zoo.domains import Loosened
 from restir_ref.transport.restir_pt import PathIntegrals
-from restir_ref.transport.zoo import TRANSPORT_BUGS, WRONG_SHIFTS, TransportBug
-from restir_ref.transport.zoo.bug import CHECKS as ZOO_CHECKS
-from restir_ref.transport.zoo.domains import Loosened
 from tests.flatland.renderings import REACH, bias, frames, images, last, paired, spread
 from tests.transport.paths import Shifts, finite_difference_jacobian, retraced
 

@@ -13,13 +13,13 @@ from restir_ref.chance import Live
 from restir_ref.transport import intersection
 from restir_ref.transport.coincidence import coincident
 from restir_ref.transport.compact import Peephole
-from restir_ref.transport.judge import judge
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
+from restir_ref.transport.proofs.judge import judge
+from restir_ref.transport.proofs.shift_checks import Effort
 from restir_ref.transport.rays import vertex
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Facet, Scene, scene
-from restir_ref.transport.shift_checks import Effort
 from restir_ref.transport.space import Space
 from tests.transport.rooms import MATTE, directions, inside, simplex, soup, walls
 from tests.transport.spaces import SPACES
@@ -188,7 +188,7 @@ def test_of_two_materials_in_one_place_the_later_one_is_in_front(space):
 
 def coincide(s: Scene) -> set[tuple[int, int]]:
     """Pairs (a, b), a < b."""
-    first, others = s.coincidence.first, s.coincidence.others
+    first, others = s.surfaces.coincidence.first, s.surfaces.coincidence.others
     return {(a, int(b)) for a in range(s.S) for b in others[first[a] : first[a + 1]] if a < b}
 
 
@@ -212,7 +212,7 @@ def test_facets_of_one_plane_coincide_where_a_point_lies_on_both(space):
     facets = [Facet((each @ plane + 0.3).tolist()) for each in flat]
     s = scene(space, [MATTE], [replace(facets[0], emission=SHINE), *facets[1:]])
     b = np.random.default_rng(9).dirichlet(np.full(d, 0.7), 2000)
-    maps, offsets = s.maps.reshape(d, s.S, d)[:-1], s.offsets.reshape(d, s.S, 1)[:-1]
+    maps, offsets = s.surfaces.maps.reshape(d, s.S, d)[:-1], s.surfaces.offsets.reshape(d, s.S, 1)[:-1]
     shared = set()
     for a in range(s.S):
         inside_of = np.einsum("ksd,dn->ksn", maps, s.corners[..., a].T @ b.T) + offsets
@@ -245,7 +245,7 @@ def test_blocks_of_pairs_are_a_matter_of_memory_only(monkeypatch):
     corners = np.array([f.corners for f in facets])
     whole = scene(s, [MATTE], facets)
     monkeypatch.setattr("restir_ref.transport.coincidence.AT_ONCE", 1)
-    found = coincident(corners, whole.maps, whole.offsets, 1e-10)
+    found = coincident(corners, whole.surfaces.maps, whole.surfaces.offsets, 1e-10)
     assert {(int(a), int(b)) for a, b in found.T if a < b} == coincide(whole)
     assert len(coincide(whole)) == 6
 

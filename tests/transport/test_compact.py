@@ -9,9 +9,9 @@ from flatland2d import SCENES
 from restir_ref import Live, Pixels, initial, shade, spatial
 from restir_ref.batch import Array, ratio
 from restir_ref.transport.compact import Compact, pack, unpack
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import Connectability, Path, Tracer
-from restir_ref.transport.reading import extended_path, factors
+from restir_ref.transport.proofs.inversion import traced
+from restir_ref.transport.proofs.reading import extended_path, factors
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.shifts import shift_path
 from tests.transport.furnished import FURNISHED, furnished_shifts

@@ -5,9 +5,9 @@ import pytest
 
 from flatland2d import PLANE, SCENES
 from restir_ref.batch import take
-from restir_ref.transport.inversion import connection
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Tracer, connectable, leaves, trace
+from restir_ref.transport.proofs.inversion import connection
 from restir_ref.transport.rays import GRAZING, arrive
 from restir_ref.transport.scene import Facet, scene
 from tests.transport.paths import HYBRID, RULES, shifts

@@ -16,11 +16,18 @@ from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.loop import random_in_row
 from restir_ref.restir import initial, shade, spatial
-from restir_ref.transport.copies import COPIES, Copy, Copying, half_vector_stretch, mirrored_or_refracted, unit_stretch
 from restir_ref.transport.lobes import LOBES, Lobe
 from restir_ref.transport.materials import Layer, Material, Vertex
 from restir_ref.transport.paths import REPLAY, Connectability, Tracer
-from restir_ref.transport.reading import extended_path
+from restir_ref.transport.proofs.copies import (
+    COPIES,
+    Copy,
+    Copying,
+    half_vector_stretch,
+    mirrored_or_refracted,
+    unit_stretch,
+)
+from restir_ref.transport.proofs.reading import extended_path
 from restir_ref.transport.scene import Ball, scene
 from restir_ref.transport.space import Space
 from restir_ref.transport.vectors import dot, norm

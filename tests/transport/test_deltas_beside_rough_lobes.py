@@ -7,10 +7,10 @@ from flatland2d import PLANE, Pinhole
 from flatland2d.scenes import room
 from restir_ref.batch import Array
 from restir_ref.chance import Live
+from restir_ref.transport.baselines.path_reuse import path_reuse
 from restir_ref.transport.materials import Layer, Material
-from restir_ref.transport.path_reuse import path_reuse
 from restir_ref.transport.paths import RECONNECTION, Tracer, leaves, radiance, trace
-from restir_ref.transport.reading import contribution, density, extended_path, factors
+from restir_ref.transport.proofs.reading import contribution, density, extended_path, factors
 from restir_ref.transport.scene import scene
 
 FURNACE = 1 + 0.5 + 0.5**2 + 0.5**3

@@ -13,8 +13,9 @@ from flatland2d import SCENES
 from restir_ref import Live, Pixels, initial, shade, spatial
 from restir_ref.batch import Array, ratio
 from restir_ref.loop import random_in_row
-from restir_ref.transport import direction_measure
-from restir_ref.transport.direction_measure import (
+from restir_ref.transport.paths import Tracer, trace
+from restir_ref.transport.proofs import direction_measure
+from restir_ref.transport.proofs.direction_measure import (
     DirectionIntegrals,
     Walk,
     primary_jacobian,
@@ -22,9 +23,8 @@ from restir_ref.transport.direction_measure import (
     shift_walk,
     walk,
 )
-from restir_ref.transport.paths import Tracer, trace
+from restir_ref.transport.proofs.reading import ALL, DELTA, NONE, ExtendedPath, extended_path
 from restir_ref.transport.rays import GRAZING
-from restir_ref.transport.reading import ALL, DELTA, NONE, ExtendedPath, extended_path
 from restir_ref.transport.restir_pt import PathIntegrals
 from tests.transport.furnished import FURNISHED, furnished_shifts
 from tests.transport.lobe_cases import stretch

@@ -12,8 +12,8 @@ from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
 from restir_ref.restir import initial, shade, spatial, temporal
 from restir_ref.transport import rays
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Ball, Scene, scene
 from restir_ref.transport.shifts import shift_path

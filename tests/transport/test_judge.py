@@ -12,17 +12,17 @@ from flatland2d.scenes import LAMP, Setting, chain, matte, room
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Shifted
-from restir_ref.transport import shift_slopes
-from restir_ref.transport.copies import COPIES, Copying, unit_stretch
-from restir_ref.transport.inversion import traced
-from restir_ref.transport.judge import CHECKS, Judgement, Shifting, judge, report
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import REPLAY, Connectability, Path, Tracer
+from restir_ref.transport.proofs import shift_slopes
+from restir_ref.transport.proofs.copies import COPIES, Copying, unit_stretch
+from restir_ref.transport.proofs.inversion import traced
+from restir_ref.transport.proofs.judge import CHECKS, Judgement, Shifting, judge, report
+from restir_ref.transport.proofs.shift_checks import Effort
+from restir_ref.transport.proofs.zoo import WRONG_SHIFTS
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Ball, scene
-from restir_ref.transport.shift_checks import Effort
 from restir_ref.transport.shifts import shift_path
-from restir_ref.transport.zoo import WRONG_SHIFTS
 from tests.transport.furnished import FURNISHED, Places
 from tests.transport.paths import HYBRID, RULES
 from tests.transport.rooms import simplex, walls

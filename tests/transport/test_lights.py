@@ -119,7 +119,7 @@ def test_points_lie_on_their_light_and_their_density_integrates_to_one(space):
     s, n = room(space), 20_000
     rng = np.random.default_rng(7)
     light = sample_light(s, rng.random(n), rng.random((space.d - 1, n)))
-    heights = (s.maps @ light.y + s.offsets)[-s.S :]
+    heights = (s.surfaces.maps @ light.y + s.surfaces.offsets)[-s.S :]
     assert np.abs(heights).min(axis=0).max() < 1e-14
     assert (heights > -1e-14).all()
     sizes = np.bincount(np.abs(heights).argmin(axis=0), 1 / light.pdf_area, s.S) / n

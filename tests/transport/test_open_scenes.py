@@ -9,7 +9,7 @@ from flatland2d import PLANE, Pinhole
 from flatland2d.scenes import Setting, chain
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import Tracer, trace
-from restir_ref.transport.reading import extended_path, factors, first_connectable
+from restir_ref.transport.proofs.reading import extended_path, factors, first_connectable
 from restir_ref.transport.record import record
 from restir_ref.transport.scene import scene as compiled
 from restir_ref.transport.shifts import shift_path

@@ -11,12 +11,11 @@ from flatland2d import PLANE, SCENES, Pinhole
 from flatland2d.scenes import chain, matte
 from restir_ref import Pixels
 from restir_ref.batch import Array, ratio, take
-from restir_ref.transport.copies import COPIES, Copying
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, Connectability, Path, Tracer, first_hit, leaves, trace
-from restir_ref.transport.rays import GRAZING
-from restir_ref.transport.reading import (
+from restir_ref.transport.proofs.copies import COPIES, Copying
+from restir_ref.transport.proofs.inversion import traced
+from restir_ref.transport.proofs.reading import (
     ALL,
     ExtendedPath,
     Factors,
@@ -28,6 +27,7 @@ from restir_ref.transport.reading import (
     offset_path,
     throughput,
 )
+from restir_ref.transport.rays import GRAZING
 from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.scene import scene as compiled

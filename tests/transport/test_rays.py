@@ -1,16 +1,14 @@
 """Rays against a reference that solves linear systems, and where floating point is most likely to go astray."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from restir_ref.batch import Array
 from restir_ref.transport import intersection
 from restir_ref.transport import scene as scenes
-from restir_ref.transport.intersection import CLEARANCE, intersect, visible
+from restir_ref.transport.intersection import CLEARANCE
 from restir_ref.transport.rays import arrive, normal, vertex
-from restir_ref.transport.scene import Ball, Facet, scene
+from restir_ref.transport.scene import Ball, Facet, Scene, scene
 from restir_ref.transport.space import Space
 from tests.transport.rooms import MATTE, crossings, directions, inside, room, simplex, soup
 from tests.transport.spaces import SPACES
@@ -34,7 +32,7 @@ def repeated(point, n: int) -> Array:
 @every_space
 def test_rays_meet_what_linear_systems_say(space):
     s, x, w = soup(space, 1), somewhere(space.d, 4000, 2), directions(space.d, 4000, 3)
-    t, prim = intersect(s, x, w)
+    t, prim = s.intersect(x, w)
     found = crossings(s, x, w)
     expected, first = found.min(axis=0), found.argmin(axis=0)
     hit = np.isfinite(expected)
@@ -48,13 +46,13 @@ def test_rays_meet_what_linear_systems_say(space):
 @every_space
 def test_blocks_of_rays_are_a_matter_of_speed_only(space, monkeypatch):
     s, x, w = soup(space, 1), somewhere(space.d, 3000, 2), directions(space.d, 3000, 3)
-    whole = (*intersect(s, x, w), visible(s, x, w))
+    whole = (*s.intersect(x, w), s.visible(x, w))
     monkeypatch.setattr(intersection, "BLOCK", 1)
-    assert all((a == b).all() for a, b in zip(whole, (*intersect(s, x, w), visible(s, x, w)), strict=True))
+    assert all((a == b).all() for a, b in zip(whole, (*s.intersect(x, w), s.visible(x, w)), strict=True))
 
 
 def blocks(simplices: int, n: int) -> list[slice]:
-    return [*intersection._blocks(SimpleNamespace(material=range(simplices)), n)]
+    return [*intersection.blocks(simplices, n)]
 
 
 @pytest.mark.parametrize("simplices", [1, 20, 128, 129, 700, 5000, 40_000])
@@ -72,8 +70,8 @@ def test_no_block_exceeds_the_cache_and_none_is_a_lone_column_that_need_not_be(s
 @every_space
 def test_directions_need_not_be_unit_vectors(space):
     s, x, w = soup(space, 1), somewhere(space.d, 1000, 2), directions(space.d, 1000, 3)
-    t, prim = intersect(s, x, w)
-    t_long, prim_long = intersect(s, x, 3 * w)
+    t, prim = s.intersect(x, w)
+    t_long, prim_long = s.intersect(x, 3 * w)
     hit = np.isfinite(t)
     assert (prim_long == prim)[hit].all()
     assert np.allclose(3 * t_long[hit], t[hit], rtol=1e-12)
@@ -85,7 +83,7 @@ def test_visibility_is_that_no_crossing_lies_between(space):
     r = np.linalg.norm(y - x, axis=0)
     expected = (crossings(s, x, (y - x) / r) >= r).all(axis=0)
     assert 0.02 < expected.mean() < 0.98
-    assert (visible(s, x, y) == expected).all()
+    assert (s.visible(x, y) == expected).all()
 
 
 # ---------------------------------------------------------------- corners and shared edges
@@ -106,7 +104,7 @@ def leaks(space: Space) -> int:
     s, n = room(space), 50_000
     x = inside(s, n, 6)
     to = on_edges(space.d, n, 7) - x
-    return int(np.isinf(intersect(s, x, to / np.linalg.norm(to, axis=0))[0]).sum())
+    return int(np.isinf(s.intersect(x, to / np.linalg.norm(to, axis=0))[0]).sum())
 
 
 @every_space
@@ -123,15 +121,17 @@ def test_without_an_edge_rays_do_slip_out(space, monkeypatch):
 @every_space
 def test_rays_that_start_on_a_wall_do_not_meet_it_and_stay_inside(space):
     s, n = room(space), 50_000
-    t, prim = intersect(s, x := inside(s, n, 8), w := directions(space.d, n, 9))
+    t, prim = s.intersect(x := inside(s, n, 8), w := directions(space.d, n, 9))
     x = x + t * w
     n_x = normal(s, x, prim)
     for lift in (1.0, 1e-3, 1e-6, 1e-9, 1e-12):
         w = directions(space.d, n, 10)
         across = (w * n_x).sum(axis=0)
         w = w + (lift * np.abs(across) - across) * n_x  # flatter and flatter
-        t, met = intersect(s, x, w / np.linalg.norm(w, axis=0))
-        near_edge = np.abs((s.maps @ x + s.offsets).reshape(space.d, s.S, n)[-1]) <= CLEARANCE * s.extent
+        t, met = s.intersect(x, w / np.linalg.norm(w, axis=0))
+        near_edge = (
+            np.abs((s.surfaces.maps @ x + s.surfaces.offsets).reshape(space.d, s.S, n)[-1]) <= CLEARANCE * s.extent
+        )
         assert (np.isfinite(t) | (near_edge.sum(axis=0) > 1)).all()
         assert (met != prim)[np.isfinite(t)].all()
 
@@ -140,7 +140,7 @@ def test_a_ray_along_a_surface_does_not_meet_it():
     plane = SPACES["plane"]
     s = scene(plane, [MATTE], [Facet(((0, 0), (1, 0))), Facet(((0, 1), (1, 1)), 0, (1.0,)), Facet(((2, -1), (2, 2)))])
     x = np.array([[-1, 0, 0.5, 1, 0.5, 0.5], [0, 0, 0, 1, 1, 0.5]], dtype=float)
-    t, prim = intersect(s, x, repeated((1, 0), 6))
+    t, prim = s.intersect(x, repeated((1, 0), 6))
     assert t.tolist() == [3, 2, 1.5, 1, 1.5, 1.5]
     assert (prim == 2).all()
 
@@ -149,7 +149,7 @@ def test_a_ray_along_a_surface_does_not_meet_it():
 def test_a_direction_of_length_zero_meets_nothing_and_makes_no_warning(space):
     s, x = soup(space, 1), somewhere(space.d, 1000, 11)
     x[:, :5] = s.centres
-    assert np.isinf(intersect(s, x, np.zeros_like(x))[0]).all()
+    assert np.isinf(s.intersect(x, np.zeros_like(x))[0]).all()
     v, _, met = arrive(s, x, np.zeros_like(x))
     assert not met.any()
     assert all(np.isfinite(part).all() for part in (v.x, v.n, v.o))
@@ -159,7 +159,7 @@ def test_a_direction_of_length_zero_meets_nothing_and_makes_no_warning(space):
 def test_a_ray_that_meets_nothing_goes_to_plus_infinity(space):
     s, x, w = room(space), 5 + somewhere(space.d, 1000, 11), directions(space.d, 1000, 12)
     away = np.where((w * (x - simplex(space.d).mean(axis=0)[:, None])).sum(axis=0) > 0, w, -w)
-    t, prim = intersect(s, x, away)
+    t, prim = s.intersect(x, away)
     assert (t == np.inf).all()
     assert (prim == 0).all()
 
@@ -167,7 +167,7 @@ def test_a_ray_that_meets_nothing_goes_to_plus_infinity(space):
 @every_space
 def test_every_point_sees_itself(space):
     s, x = soup(space, 1), somewhere(space.d, 1000, 12)
-    assert visible(s, x, x).all()
+    assert s.visible(x, x).all()
 
 
 # ---------------------------------------------------------------- what is on a surface
@@ -182,16 +182,16 @@ def hair_off_a_wall(space: Space, gap: float) -> tuple[Array, Array]:
     b = 0.5 / space.d + 0.5 * np.random.default_rng(8).dirichlet(np.ones(space.d), n).T
     x, out = s.corners[..., 0].T @ b, s.normals[:, :1]
     start = x + gap * s.extent * out
-    t, prim = intersect(s, start, np.repeat(-out, n, axis=1))
-    return (prim == 0) & (t < 2 * gap * s.extent), ~visible(s, start, x - 1e-3 * out)
+    t, prim = s.intersect(start, np.repeat(-out, n, axis=1))
+    return (prim == 0) & (t < 2 * gap * s.extent), ~s.visible(start, x - 1e-3 * out)
 
 
 def hair_off_a_ball(space: Space, gap: float, side: int) -> tuple[Array, Array]:
     """The same for a ball, from outside (side 1) or inside (-1)."""
     s, out = bowl(space, 0.2, 0.3), directions(space.d, 1000, 17)
     start = 0.2 + (0.3 + side * gap * s.extent) * out
-    t, _ = intersect(s, start, -side * out)
-    return t < 2 * gap * s.extent, ~visible(s, start, 0.2 + (0.3 - side * 0.01) * out)
+    t, _ = s.intersect(start, -side * out)
+    return t < 2 * gap * s.extent, ~s.visible(start, 0.2 + (0.3 - side * 0.01) * out)
 
 
 @every_space
@@ -224,7 +224,7 @@ def pairs(space: Space, n: int = 100_000) -> tuple[Array, Array]:
     """Points on surfaces, in corners, a hair off surfaces, and in the open."""
     s = soup(space, 1)
     x, w = somewhere(space.d, 2 * n, 13), directions(space.d, 2 * n, 14)
-    t, prim = intersect(s, x, w)
+    t, prim = s.intersect(x, w)
     on = np.isfinite(t)
     hair = np.random.default_rng(15).choice([0, 1e-15, 1e-12, 1e-9, 1e-7], 2 * n)
     x = np.where(on, x + np.where(on, t, 0) * w + hair * normal(s, x, prim), x)
@@ -241,14 +241,14 @@ def asymmetries(sees, space: Space) -> int:
 
 @every_space
 def test_visibility_is_symmetric_to_the_last_bit(space):
-    assert asymmetries(visible, space) == 0
+    assert asymmetries(Scene.visible, space) == 0
 
 
 def by_ray(s, x, y):
     """A mistake: shoot from x towards y and compare lengths."""
     to = y - x
     r = np.maximum(np.linalg.norm(to, axis=0), 1e-300)
-    return intersect(s, x, to / r)[0] >= r - 1e-8
+    return s.intersect(x, to / r)[0] >= r - 1e-8
 
 
 @every_space
@@ -270,9 +270,9 @@ def test_balls_are_met_from_outside_inside_and_from_themselves(space):
     s, n = bowl(space), 20_000
     w, out = directions(space.d, n, 16), directions(space.d, n, 17)
     cos = (w * out).sum(axis=0)
-    assert np.abs(intersect(s, -3 * w, w)[0] - 2).max() < 1e-12
-    assert np.abs(intersect(s, 0 * w, w)[0] - 1).max() < 1e-12
-    t, prim = intersect(s, out, w)  # starts on the ball: a chord, or the light
+    assert np.abs(s.intersect(-3 * w, w)[0] - 2).max() < 1e-12
+    assert np.abs(s.intersect(0 * w, w)[0] - 1).max() < 1e-12
+    t, prim = s.intersect(out, w)  # starts on the ball: a chord, or the light
     assert (np.isinf(t) | (prim < s.S))[cos > 1e-8].all()
     assert np.allclose(t[cos < -1e-8], -2 * cos[cos < -1e-8], rtol=1e-6)
 
@@ -283,10 +283,10 @@ def test_points_on_a_ball_see_out_but_not_through_it(space):
     out, y = directions(space.d, n, 18), 3 * directions(space.d, n, 19)
     to = y - out
     slope = (to * out).sum(axis=0)
-    assert (visible(s, out, y) == (slope > 0))[np.abs(slope) > 1e-8].all()
-    assert visible(s, out, directions(space.d, n, 20)).all()  # through the inside, as in glass
-    assert visible(s, 0.1 * out, 0.2 * y / 3).all()
-    assert not visible(s, 0.1 * out, y).any()
+    assert (s.visible(out, y) == (slope > 0))[np.abs(slope) > 1e-8].all()
+    assert s.visible(out, directions(space.d, n, 20)).all()  # through the inside, as in glass
+    assert s.visible(0.1 * out, 0.2 * y / 3).all()
+    assert not s.visible(0.1 * out, y).any()
 
 
 @every_space
@@ -295,8 +295,8 @@ def test_grazing_rays_past_a_ball_either_touch_it_or_do_not(space):
     along = np.eye(space.d)[0]
     for gap, touches in ((1e-6, False), (-1e-6, True)):
         x = repeated(-3 * along + (1 + gap) * np.eye(space.d)[1], 1)
-        assert np.isfinite(intersect(s, x, repeated(along, 1))[0]).all() == touches
-    assert intersect(s, repeated(-3 * along + np.eye(space.d)[1], 1), repeated(along, 1))[0].shape == (1,)
+        assert np.isfinite(s.intersect(x, repeated(along, 1))[0]).all() == touches
+    assert s.intersect(repeated(-3 * along + np.eye(space.d)[1], 1), repeated(along, 1))[0].shape == (1,)
 
 
 # ---------------------------------------------------------------- vertices

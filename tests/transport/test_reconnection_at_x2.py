@@ -5,8 +5,8 @@ import numpy as np
 from flatland2d import SCENES
 from restir_ref import Pixels
 from restir_ref.batch import Array
-from restir_ref.transport.inversion import traced
 from restir_ref.transport.paths import RECONNECTION, Tracer
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.restir_pt import ReconnectionAtX2
 from tests.transport.paths import Shifts, shifts
 

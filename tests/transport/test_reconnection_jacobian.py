@@ -13,12 +13,12 @@ import pytest
 
 from restir_ref.batch import Array, ratio, take
 from restir_ref.integrals import Pixels
-from restir_ref.transport.direction_measure import Walk, reconnection_jacobian, shift_walk, walk
 from restir_ref.transport.paths import RECONNECTION
-from restir_ref.transport.reading import extended_path
+from restir_ref.transport.proofs.direction_measure import Walk, reconnection_jacobian, shift_walk, walk
+from restir_ref.transport.proofs.reading import extended_path
+from restir_ref.transport.proofs.zoo import WRONG_SHIFTS
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.vectors import norm, normalize
-from restir_ref.transport.zoo import WRONG_SHIFTS
 from tests.transport.furnished import furnished_shifts
 from tests.transport.paths import Shifts
 from tests.transport.spaces import SPACES

@@ -13,12 +13,12 @@ from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.transport import scene as scenes
 from restir_ref.transport.intersection import CLEARANCE
-from restir_ref.transport.judge import judge, report
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import Tracer, radiance, trace
+from restir_ref.transport.proofs.judge import judge, report
+from restir_ref.transport.proofs.shift_checks import Effort
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import EDGE, FAR, Ball, Facet, scene
-from restir_ref.transport.shift_checks import Effort
 from tests.transport.paths import HYBRID
 from tests.transport.rooms import MATTE, soup, walls
 from tests.transport.spaces import SPACES
@@ -29,7 +29,9 @@ every_space = pytest.mark.parametrize("space", SPACES.values(), ids=SPACES)
 @every_space
 def test_the_maps_give_a_facet_s_corners_unit_coordinates_and_height_zero(space):
     s, d = soup(space, 1), space.d
-    at = np.einsum("fsk,cks->fcs", s.maps.reshape(d, s.S, d), s.corners) + s.offsets.reshape(d, 1, s.S)
+    at = np.einsum("fsk,cks->fcs", s.surfaces.maps.reshape(d, s.S, d), s.corners) + s.surfaces.offsets.reshape(
+        d, 1, s.S
+    )
     unit = np.concatenate(
         [np.zeros((d, 1)), np.eye(d)[:, : d - 1]], axis=1
     )  # one column per corner, the last row heights
@@ -39,14 +41,14 @@ def test_the_maps_give_a_facet_s_corners_unit_coordinates_and_height_zero(space)
 @every_space
 def test_heights_are_distances_from_the_plane(space):
     s, x = soup(space, 1), np.random.default_rng(2).random((space.d, 100))
-    heights = (s.maps @ x + s.offsets)[-s.S :]
+    heights = (s.surfaces.maps @ x + s.surfaces.offsets)[-s.S :]
     expected = np.einsum("ds,dsn->sn", s.normals, x[:, None] - s.corners[0][:, :, None])
     assert np.abs(heights - expected).max() < 1e-12
 
 
 def test_facets_are_larger_by_edge():
     s = scene(SPACES["plane"], [MATTE], [Facet(((0, 0), (2, 0)), 0, (1.0,))])
-    assert s.offsets[0, 0] == pytest.approx(EDGE, rel=1e-9)
+    assert s.surfaces.offsets[0, 0] == pytest.approx(EDGE, rel=1e-9)
 
 
 @every_space
@@ -114,7 +116,7 @@ def test_rounding_is_as_small_a_share_of_the_clearance_wherever_a_scene_stands(s
     moved = [replace(f, corners=(np.array(f.corners) + at).tolist(), emission=(1.0,)) for f in walls(space.d)]
     s, b = scene(space, [MATTE], moved), np.random.default_rng(5).dirichlet(np.ones(space.d), 1000)
     for k in range(s.S):
-        height = np.abs(s.maps[-s.S :][k] @ (s.corners[..., k].T @ b.T) + s.offsets[-s.S :][k])
+        height = np.abs(s.surfaces.maps[-s.S :][k] @ (s.corners[..., k].T @ b.T) + s.surfaces.offsets[-s.S :][k])
         assert height.max() < 2e-5 * CLEARANCE * s.extent
 
 

@@ -9,14 +9,14 @@ import pytest
 from restir_ref.batch import Array, take
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Shifted
-from restir_ref.transport import judge as judging
-from restir_ref.transport import shift_checks
-from restir_ref.transport.inversion import primary_sample
-from restir_ref.transport.judge import CHECKS, Shifting, judge
 from restir_ref.transport.paths import RECONNECTION, Path, Tracer
+from restir_ref.transport.proofs import judge as judging
+from restir_ref.transport.proofs import shift_checks
+from restir_ref.transport.proofs.inversion import primary_sample
+from restir_ref.transport.proofs.judge import CHECKS, Shifting, judge
+from restir_ref.transport.proofs.shift_checks import Case, Effort, Trial, same_path
+from restir_ref.transport.proofs.shift_slopes import EXTREMES, STRATA, evenly, spread, stratum
 from restir_ref.transport.restir_pt import PathIntegrals
-from restir_ref.transport.shift_checks import Case, Effort, Trial, same_path
-from restir_ref.transport.shift_slopes import EXTREMES, STRATA, evenly, spread, stratum
 from restir_ref.transport.shifts import shift_path
 from tests.transport.paths import HYBRID, shifts
 from tests.transport.test_judge import SETTINGS, tracer

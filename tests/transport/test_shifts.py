@@ -12,10 +12,10 @@ from flatland2d import PLANE, SCENES
 from flatland2d.scenes import CORNELL_VIEW, LAMP, Setting, boxes, chain, room
 from restir_ref.batch import take
 from restir_ref.transport import shifts as shifts_module
-from restir_ref.transport.inversion import connection, primary_sample, traced
 from restir_ref.transport.materials import Layer, Material, evaluate_lobe
 from restir_ref.transport.paths import Connectability
-from restir_ref.transport.reading import extended_path
+from restir_ref.transport.proofs.inversion import connection, primary_sample, traced
+from restir_ref.transport.proofs.reading import extended_path
 from restir_ref.transport.scene import scene
 from restir_ref.transport.shifts import replay, shift_path
 from restir_ref.transport.vectors import norm
@@ -146,7 +146,7 @@ def nearest_connections(scene, rule, count=N) -> tuple[float, float]:
     connected = s.x.c > 0
     for path, pixel in ((s.x, s.i), (s.y, s.j)):
         part = take(path, np.flatnonzero(connected))
-        v = replay(s.t, part, pixel[connected], part.c - 1).v
+        v = replay(s.t, part, pixel[connected]).v
         found.append(float(np.linalg.norm(part.z - v.x, axis=0).min(initial=1)))
     return found[0], found[1]
 

@@ -9,7 +9,8 @@ import pytest
 from flatland2d.space import Plane
 from restir_ref.transport.space import ball_volume, sphere_area
 from tests.transport.lobe_cases import facing, stretch, views
-from tests.transport.spaces import SEEING, SPACES, Solid
+from tests.transport.spaces import SEEING, SPACES
+from tracer3d.space import Solid
 
 every_space = pytest.mark.parametrize("name", SPACES)
 every_seeing_space = pytest.mark.parametrize("name", SEEING)

@@ -15,7 +15,7 @@ MEAN, VARIANCE = "mean with f = p_hat", "variance against the right loop"
 HEAD = """\
 # Symptoms
 
-What is wrong with the image, and which mistake does that. Made by `python -m restir_ref.transport.zoo >
+What is wrong with the image, and which mistake does that. Made by `python -m restir_ref.transport.proofs.zoo >
 docs/symptoms.md` from the bug zoo; do not edit. Every mistake is planted in a loop of ReSTIR small enough to
 enumerate, so its numbers are exact, for one small scene each: in other scenes the sizes differ. Mistakes about paths
 and shifts come last. The keys in brackets are explained in [references.md](references.md).

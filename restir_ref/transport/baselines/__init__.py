@@ -1,0 +1,1 @@
+"""What ReSTIR PT is compared with: path reuse, ReSTIR GI, ReSTIR DI."""

@@ -1,0 +1,10 @@
+"""`python -m restir_ref.transport.proofs.zoo > docs/symptoms.md` writes the index of symptoms anew."""
+
+import sys
+
+from restir_ref.oracle.zoo import BUGS, INEFFICIENT
+from restir_ref.oracle.zoo.page import page
+from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
+from restir_ref.transport.proofs.zoo.page import section
+
+sys.stdout.write(page([*BUGS.values(), *INEFFICIENT.values()]) + "".join(section([*TRANSPORT_BUGS.values()])))

@@ -1,0 +1,152 @@
+"""The command: what it writes, what it says of mistakes, and that Ctrl-C keeps what is done."""
+
+import numpy as np
+import pytest
+
+from tracer3d import cli, files, methods
+from tracer3d.methods import METHODS
+from tracer3d.scenes import SCENES
+
+SMALL = ["--size", "8x8", "--crop", "--depth", "2"]
+
+
+def run(*words) -> int:
+    return cli.main([str(word) for word in words])
+
+
+def test_render_writes_a_picture_in_three_files(tmp_path, capsys):
+    assert run("render", "cornell", "--frames", 2, *SMALL, "--out", tmp_path / "a.png") == 0
+    assert files.read_pfm(tmp_path / "a.pfm").shape == (3, 8, 8)
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert "2 of 2 frames" in capsys.readouterr().out
+
+
+def test_the_same_command_with_more_frames_goes_on(tmp_path):
+    first, both = tmp_path / "a.png", tmp_path / "b.png"
+    for frames in (2, 5):
+        assert run("render", "crease", "--method", "path", "--frames", frames, *SMALL, "--out", first) == 0
+    assert run("render", "crease", "--method", "path", "--frames", 5, *SMALL, "--out", both) == 0
+    assert first.with_suffix(".pfm").read_bytes() == both.with_suffix(".pfm").read_bytes()
+
+
+def interrupted_at(monkeypatch, frame: int) -> None:
+    """Ctrl-C is pressed while that frame is rendered."""
+    right = methods.traced
+
+    def traced(t, pixel, chance):
+        if next(count) == frame:
+            raise KeyboardInterrupt
+        return right(t, pixel, chance)
+
+    count = iter(range(100))
+    monkeypatch.setattr(methods, "traced", traced)
+
+
+def test_ctrl_c_keeps_what_is_done_and_the_same_command_finishes_it(tmp_path, monkeypatch, capsys):
+    command = ["render", "crease", "--method", "path", "--frames", 5, *SMALL, "--out"]
+    with monkeypatch.context() as patch:
+        interrupted_at(patch, 3)
+        assert run(*command, tmp_path / "a.png") == 130
+    said = capsys.readouterr().out
+    assert "3 of 5 frames" in said
+    assert "the same command goes on from there" in said
+    assert run(*command, tmp_path / "a.png") == run(*command, tmp_path / "b.png") == 0
+    assert (tmp_path / "a.pfm").read_bytes() == (tmp_path / "b.pfm").read_bytes()
+
+
+def test_ctrl_c_in_the_first_frame_leaves_nothing(tmp_path, monkeypatch, capsys):
+    interrupted_at(monkeypatch, 0)
+    assert run("render", "crease", "--method", "path", *SMALL, "--out", tmp_path / "a.png") == 130
+    assert not [*tmp_path.iterdir()]
+    assert "before the first frame" in capsys.readouterr().err
+
+
+def test_errors_against_a_reference_stand_in_the_bar(tmp_path, capsys):
+    picture = tmp_path / "a.png"
+    run("render", "crease", "--method", "path", "--frames", 3, *SMALL, "--out", picture)
+    run("render", "crease", "--frames", 1, *SMALL, "--out", tmp_path / "b.png", "--reference", tmp_path / "a.pfm")
+    assert "MAPE 0." in capsys.readouterr().err
+
+
+def test_compare_prints_a_table_and_draws_a_sheet(tmp_path, capsys):
+    words = ["compare", "crease", "--methods", "path,restir-pt", "--rays", 60, "--trees", 8, *SMALL]
+    assert run(*words, "--out", tmp_path / "c.png") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["method", "frames", "rays/px", "seconds", "MAPE", "relMSE", "RMSE"]
+    assert [line.split()[0] for line in lines[1:3]] == ["path", "restir-pt"]
+    assert all(float(line.split()[2]) >= 60 for line in lines[1:3])
+    assert (tmp_path / "c.png").exists()
+
+
+def test_list_names_every_scene_and_method(capsys):
+    assert run("list") == 0
+    said = capsys.readouterr().out
+    assert all(name in said for name in [*SCENES, *METHODS])
+
+
+def test_thumbnails_are_drawn_two_in_a_row(tmp_path, monkeypatch):
+    monkeypatch.setattr(cli, "SCENES", {name: SCENES[name] for name in ("crease", "furnace")})
+    assert cli._thumbnails(tmp_path / "t.png", trees=1) == 0
+    from matplotlib.image import imread  # noqa: PLC0415
+
+    assert imread(tmp_path / "t.png").shape == (90, 320, 4)
+
+
+def test_the_camera_stands_unless_told_to_move():
+    parse = cli.parser().parse_args
+    assert parse(["render", "crease"]).moving == parse(["render", "crease", "--still"]).moving == 0
+    assert parse(["render", "crease", "--moving"]).moving == 1
+
+
+MISTAKES = {
+    "a misspelt scene": (["corneli"], "no scene 'corneli': did you mean 'cornell'?"),
+    "an unknown method": (["crease", "--method", "pth"], "no method 'pth', only 'path'"),
+    "an unknown preset": (["crease", "--preset", "fast"], "no preset 'fast', only 'realtime', 'offline'"),
+    "a crop off the film": (["crease", "--crop", "1900,0"], "begins at 1900 and has 64"),
+    "a size of nothing": (["crease", "--size", "0x4"], "is 0. Say --size 64x64."),
+    "an absurd size": (["crease", "--size", "20000x20000"], "needs about 4470.3 GiB, more than 4"),
+    "a depth of 0": (["crease", "--depth", "0"], "the path depth must be a whole number >= 1, but is 0"),
+    "tiles that do not fill it": (["crease", "--method", "path-reuse", "--size", "10x8"], "multiples of 4"),
+    "a missing reference": (["crease", "--reference", "nowhere.pfm"], "nowhere.pfm"),
+}
+
+
+@pytest.mark.parametrize(("words", "said"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_named_and_nothing_is_written(tmp_path, capsys, words, said):
+    assert run("render", *words, "--out", tmp_path / "a.png") == 2
+    assert said in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--size", "64"], "'64' is not a size, columns x rows, such as 64x48"),
+        (["--crop", "a,b"], "'a,b' is not a column and a row"),
+        (["--frames", "-1"], "'-1' is not a whole number"),
+        (["--still", "--moving"], "not allowed with"),
+    ],
+)
+def test_words_that_are_no_numbers_are_refused(capsys, words, said):
+    with pytest.raises(SystemExit, match="2"):
+        run("render", "crease", *words)
+    assert said in capsys.readouterr().err
+
+
+def test_a_reference_of_another_size_and_a_comparison_without_budget_are_refused(tmp_path, capsys):
+    files.write_pfm(tmp_path / "r.pfm", np.ones((3, 4, 6)))
+    assert run("render", "crease", *SMALL, "--reference", tmp_path / "r.pfm", "--out", tmp_path / "a.png") == 2
+    assert "has 6 x 4 pixels, but the picture (8, 8)" in capsys.readouterr().err
+    assert run("compare", "crease", *SMALL) == 2
+    assert "say --rays 1000, or --seconds 10" in capsys.readouterr().err
+
+
+def test_a_run_of_other_settings_is_not_overwritten(tmp_path, capsys):
+    command = ["render", "crease", "--method", "path", "--frames", 1, *SMALL, "--out", tmp_path / "a.png"]
+    assert run(*command) == 0
+    before = (tmp_path / "a.pfm").read_bytes()
+    assert run(*command, "--seed", 9) == 2
+    assert "seed 1 -> 9" in capsys.readouterr().err
+    assert (tmp_path / "a.pfm").read_bytes() == before
+    assert run(*command, "--seed", 9, "--anew") == 0
+    assert (tmp_path / "a.pfm").read_bytes() != before

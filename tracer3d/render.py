@@ -1,0 +1,115 @@
+"""From a scene to a picture: frames of a method, their mean, and where an earlier run has stopped."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from types import MappingProxyType
+
+import numpy as np
+
+from restir_ref.batch import Array
+from restir_ref.chance import Chance
+from restir_ref.guards import named, whole
+from restir_ref.transport.paths import Tracer
+from restir_ref.transport.scene import Scene
+from tracer3d.methods import METHODS, PRESETS, Shot
+from tracer3d.scenes import Setting, setting
+from tracer3d.sensors import Pinhole
+
+BYTES: Mapping[str, int] = MappingProxyType({"realtime": 12_000, "offline": 18_000})
+"""Memory per pixel of methods that hold a whole frame, by preset: the most that was measured on `cornell`."""
+
+MOST = 4 * 2**30
+"""Bytes that a picture may need."""
+
+Chances = Callable[[int], Chance]
+"""The chance of every frame by its number."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is asked for; whatever changes the picture but the number of frames.
+
+    size   columns and rows;  crop  column and row of the film at which they begin, None for all of the view
+    moving  steps of the camera per frame: a picture of a moving camera is its last frame, of a still one the mean
+    Raises ValueError for unknown names, a crop off the film, and pictures that need too much memory.
+    """
+
+    scene: str
+    method: str
+    preset: str = "realtime"
+    size: tuple[int, int] = (64, 64)
+    crop: tuple[int, int] | None = None
+    moving: float = 0.0
+    depth: int | None = None
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        named(METHODS, self.method, "method")
+        named(PRESETS, self.preset, "preset")
+        for count in self.size:
+            whole(count, 1, "each side of a picture", "Say --size 64x64.")
+        needed = self.size[0] * self.size[1] * BYTES[self.preset]
+        if self.method != "path" and needed > MOST:
+            raise ValueError(
+                f"a picture of {self.size[0]} x {self.size[1]} pixels by {self.method} needs about "
+                f"{needed / 2**30:.1f} GiB, more than {MOST / 2**30:.0f}: render a smaller one, a crop, or by path."
+            )
+        if self.method == "path-reuse" and any(count % 4 for count in self.size):
+            raise ValueError(f"path reuse needs sides that are multiples of 4, but the size is {self.size}.")
+        self.sensor(0)
+
+    def setting(self, frame: float) -> Setting:
+        """The scene as the camera of a frame sees it."""
+        at, steps = _begun(self.scene, self.depth), frame * self.moving
+        return at.at(steps) if steps else at
+
+    def sensor(self, frame: float) -> Pinhole:
+        """The camera of a frame."""
+        at = self.setting(frame)
+        return at.view(*self.size) if self.crop is None else at.pinhole(*self.size, self.crop)
+
+    def tracer(self, frame: int, scene: Scene) -> Tracer:
+        """The tracer of a frame, in a scene that is compiled once."""
+        return Tracer(scene, self.sensor(frame), self.setting(frame).depth, METHODS[self.method].rule)
+
+
+@cache
+def _begun(scene: str, depth: int | None) -> Setting:
+    at = setting(scene)
+    return at if depth is None else replace(at, depth=depth)
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """The sum of frames (C, rows, columns) and how many they are; of a moving camera the last one, times as many."""
+
+    sum: Array
+    frames: int
+
+    @property
+    def mean(self) -> Array:
+        """What is shown, (C, rows, columns)."""
+        return np.asarray(self.sum / max(self.frames, 1))
+
+
+def blank(job: Job) -> Picture:
+    """Before the first frame."""
+    columns, rows = job.size
+    return Picture(np.zeros((job.setting(0).scene.C, rows, columns)), 0)
+
+
+def render(job: Job, chances: Chances, frames: int, begun: Picture, scene: Scene) -> Iterator[Picture]:
+    """The picture after every further frame, up to `frames`.
+
+    Frames are numbered from the beginning of the first run, so that a run that was ended and goes on draws what one
+    in a single go would; methods with history begin it anew.
+    """
+    columns, rows = job.size
+    shots = (Shot(job.tracer(k, scene), chances(k)) for k in range(begun.frames, frames))
+    images = METHODS[job.method].frames(shots, PRESETS[job.preset], (rows, columns))
+    now = begun
+    for image in images:
+        L = image.reshape(-1, rows, columns)
+        now = Picture(L * (now.frames + 1) if job.moving else now.sum + L, now.frames + 1)
+        yield now
