@@ -32,7 +32,8 @@ WORDS = {
     "included. A run in which another one comes out says so, and ends with exit status 1.",
     "preset": "How much is computed: quick takes minutes, paper hours, with the papers' sample counts. What the paper "
     "preset found is kept in figures/paper.json.",
-    "world": "Where it is measured: toy1d, integrands on a line; flatland2d, light in the plane.",
+    "world": "Where it is measured: toy1d, integrands on a line; flatland2d, light in the plane; tracer3d, light in "
+    "space.",
     "criterion": "The rule by which a value passes or fails. Random error counts: what is too noisy to decide fails.",
 }
 MEASURES = {
@@ -46,19 +47,19 @@ MEASURES = {
 }
 OTHER_SCENES = {
     "T0": "Finite cells, small enough that all random choices are enumerated.",
-    "FS11": "Rooms for light probes (FS11 to FS13), still to come.",
-    "CB3": "Scenes whose names end in 3 are the same in three dimensions, still to come.",
+    **dict.fromkeys(("FS11", "FS12", "FS13"), "A room for light probes, still to come."),
 }
 
 
 def known_scenes() -> dict[str, str]:
     """Scene -> what it is: what the sources say, then what has no function of its own."""
     found = {**scenes(ROOT), **OTHER_SCENES}
-    return dict(sorted(found.items(), key=lambda item: (re.sub(r"\d", "", item[0]), int(_digits(item[0])))))
+    return {name: found[name] for name in sorted(found, key=_rank)}
 
 
-def _digits(name: str) -> str:
-    return re.sub(r"\D", "", name) or "0"
+def _rank(name: str) -> tuple[str, int]:
+    """FS2 before FS10."""
+    return re.sub(r"\d", "", name), int(re.sub(r"\D", "", name) or 0)
 
 
 def glossary() -> Iterator[str]:

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from figures.claims.scan import WORLDS
 from figures.report.markup import sentences
 
-PACKAGES = ("restir_ref", *dict.fromkeys(WORLDS.values()))
+PACKAGES = ("restir_ref", "toy1d", "flatland2d", "tracer3d")
 CITED = re.compile(r"\[([A-Z]{3,}) ([^\]]*)\]")
 NUMBER = re.compile(r"(Eqs?\.|Def\.|Thm\.|Theorem|Fig\.|Sec\.)? ?(\d+(?:\.\d+)*|A\.\d)(?:[-–](\d+))?")
-SCENE = re.compile(r"(FS\d+|T\d+|T[A-Z]): (.*)", re.DOTALL)
+SCENE = re.compile(r"(FS\d+|T\d+|T[A-Z]|[A-Z]\w*3(?:-\w+)?): (.*)", re.DOTALL)
 OF_ONE_KIND = {"Eqs.": "Eq.", "Theorem": "Thm.", "": "Sec."}
 
 
@@ -52,7 +51,8 @@ def numbers(text: str) -> Iterator[str]:
 def scenes(root: Path) -> Mapping[str, str]:
     """Scene -> what its function's docstring says of it, in one sentence."""
     found = (SCENE.match(text) for _, text in _docstrings(root))
-    return {match[1]: sentences(match[2])[0] for match in found if match}
+    said = {match[1]: sentences(match[2].partition("\n\n")[0])[0] for match in found if match}
+    return {name: text[:1].upper() + text[1:] for name, text in said.items()}
 
 
 def _docstrings(root: Path) -> Iterator[tuple[Place, str]]:
