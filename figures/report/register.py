@@ -24,7 +24,7 @@ def register(judged: Sequence[Judged], beside: Beside) -> Iterator[str]:
     yield '<section>\n<h2 id="all-claims">All claims</h2>'
     yield f"<details><summary>The table of all {len(ids)} claims, with a filter</summary>"
     yield from _filter(ids, beside)
-    yield '<div class="wide" tabindex="0" role="region" aria-label="All claims"><table>'
+    yield '<div class="wide" tabindex="0" role="region" aria-label="All claims"><table class="register">'
     yield "<caption>Every claim, with what was measured and the rule it was judged by</caption>"
     yield f"<thead><tr>{''.join(_head(name) for name in COLUMNS)}</tr></thead>"
     for id_ in ids:
