@@ -1,7 +1,7 @@
 """One run: compute the chunks that are missing, finish the figures that are complete, report.
 
 Every chunk is stored once it is done: whatever ends a run early, the same command goes on from there.  The report is
-written while figures finish, as far as that takes little of the time.
+written at once, and again while figures finish, as far as that takes little of the time.
 """
 
 import time
@@ -38,7 +38,6 @@ def run(
     """
     with outdir.opened(request.out, registry, progress.say):
         mine = session.begin(request, ledger, progress.say)
-        session.note(mine, "running")
         ending = _work(mine, progress)
         session.note(mine, ending.words)
         judged = request.press.report(request.out)
@@ -53,6 +52,7 @@ def _work(mine: Session, progress: Progress) -> Ending:
     total = sum(len(numbers) for numbers in mine.missing.values())
     news = Sparing(partial(_report, mine))
     try:
+        _report(mine)
         with progress.bar(total):
             for id_ in mine.plans:
                 if _finish_if_complete(mine, id_, progress):

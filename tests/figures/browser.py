@@ -60,13 +60,27 @@ def browser():
     return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), "")
 
 
-def looks(page, widths, height, axe=""):
-    """Width -> what was found in a frame of that width: excess width, first picture, alts, requests, violations."""
-    frames = (f'<iframe id="{w}" src="{page.name}" style="width:{w}px;height:{height}px"></iframe>' for w in widths)
-    harness = page.with_name("harness.html")
+def looks(page, widths, height, axe="", place=None):
+    """Width -> what was found in a frame of that width: excess width, first picture, alts, requests, violations.
+
+    What the browser needs is written to `place`, the page's folder unless told otherwise.
+    """
+    place = place or page.parent
+    style = "width:{}px;height:{}px"
+    frames = (f'<iframe id="{w}" src="{page.as_uri()}" style="{style.format(w, height)}"></iframe>' for w in widths)
+    harness = place / "harness.html"
     harness.write_text(HARNESS % {"frames": "\n".join(frames), "axe": Path(axe).resolve().as_uri() if axe else ""})
-    command = [browser(), *FLAGS, f"--user-data-dir={page.with_name('browser')}", "--dump-dom", harness.as_uri()]
-    seen = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
-    found = re.search(r'<pre id="found">(.+?)</pre>', seen, re.DOTALL)
+    found = re.search(r'<pre id="found">(.+?)</pre>', _run(place, "--dump-dom", harness.as_uri()), re.DOTALL)
     assert found, "the browser measured nothing"
     return {int(width): each for width, each in json.loads(html.unescape(found[1])).items()}
+
+
+def pages(page, place):
+    """On how many sheets of paper the page is printed."""
+    _run(place, f"--print-to-pdf={place / 'printed.pdf'}", page.as_uri())
+    return len(re.findall(rb"/Type\s*/Page\b", (place / "printed.pdf").read_bytes()))
+
+
+def _run(place, *words):
+    command = [browser(), *FLAGS, f"--user-data-dir={place / 'browser'}", *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout

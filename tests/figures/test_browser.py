@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.figures.browser import AXE, browser, looks
+from tests.checkout import ROOT
+from tests.figures.browser import AXE, browser, looks, pages
 from tests.figures.test_report import page
 
 WIDTHS = (1400, 480)
@@ -54,3 +55,19 @@ def test_grey_on_grey_is_noticed_by_axe(done):
     _, out = done
     (out / "index.html").write_text(page(out).replace("<main>", "<main><p style='color:#999;background:#aaa'>grey</p>"))
     assert "axe" in faults(looks(out / "index.html", WIDTHS[:1], SCREEN, AXE))
+
+
+WHOLE = ROOT / "out" / "index.html"
+"""The report of all figures, where `make figures` has made one."""
+
+
+@pytest.mark.skipif(not WHOLE.exists(), reason="no report of all figures here: make figures")
+def test_the_report_of_all_figures_fits_its_window_and_prints_on_less_than_40_pages(tmp_path):
+    (tmp_path / "out").symlink_to(WHOLE.parent)
+    assert faults(looks(tmp_path / "out" / "index.html", WIDTHS, SCREEN, AXE, place=tmp_path)) == set()
+    assert 2 < pages(WHOLE, tmp_path) < 40
+
+
+def test_pages_are_counted(tmp_path):
+    (tmp_path / "index.html").write_text("<p style='break-after:page'>1</p>" * 6 + "<p>7</p>")
+    assert pages(tmp_path / "index.html", tmp_path) == 7

@@ -180,7 +180,7 @@ def test_the_page_is_written_as_figures_finish(tmp_path, monkeypatch):
     monkeypatch.setattr("figures.engine.progress.Sparing.__call__", lambda news: news.do())
     monkeypatch.setattr("figures.report.running.told", lambda data: pages.append(ahead(data).missing) or [])
     assert figures(here, "run", "--out", tmp_path / "out") == 0
-    assert pages == [("DEMO-F05",), (), ()]
+    assert pages == [("DEMO-F01", "DEMO-F05"), ("DEMO-F05",), (), ()]
 
 
 def test_news_take_a_small_part_of_the_time(monkeypatch):
