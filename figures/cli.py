@@ -18,7 +18,7 @@ from figures.engine import audit, cluster, jobs, kept, registry, run, session, s
 from figures.engine.jobs import Crew
 from figures.engine.progress import DISABLE, Progress
 from figures.project import Project
-from figures.report import report, style, tables
+from figures.report import legible, press, report, tables
 
 SEED = 20220711
 FOLDER = Path("out")
@@ -149,9 +149,9 @@ def _run(options: argparse.Namespace, project: Project) -> int:
     entries, rows = registry.load(project.modules), ledger.load(project.ledger)
     chosen = tuple(registry.select(entries, options.ids))
     _refuse(list(ledger.unknown(rows, chosen)))
-    progress, press = Progress(options.progress), session.Press(style.drawn, _report_of(project, rows, entries))
+    progress, hooks = Progress(options.progress), session.Press(press.drawn, _report_of(project, rows, entries))
     with _crew(options, chosen, progress) as crew:
-        request = session.Request(chosen, options.preset, options.seed, crew, press, options.out)
+        request = session.Request(chosen, options.preset, options.seed, crew, hooks, options.out)
         status, judged = run.run(request, rows, entries, project.paper, progress)
     _say(judged, project, options.out)
     return status
@@ -203,7 +203,7 @@ def _keep(options: argparse.Namespace, project: Project) -> int:
 
 def _audit(options: argparse.Namespace, project: Project) -> int:
     entries, rows = registry.load(project.modules), ledger.load(project.ledger)
-    problems = list(audit.problems(project.paper, rows, entries, options.out))
+    problems = [*audit.problems(project.paper, rows, entries, options.out), *legible.problems(options.out)]
     print("\n".join([*problems, f"{len(problems)} problems" if problems else "nothing to mend"]))
     for line in audit.remarks(project.paper, entries):
         print(line)

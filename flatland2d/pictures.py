@@ -12,7 +12,7 @@ import numpy as np
 
 from flatland2d.scenes import INSET, Setting
 from flatland2d.sensors import FILM, Pinhole
-from flatland2d.tone import exposure, tone, untone
+from flatland2d.tone import exposure, tone
 from restir_ref.batch import Array, ratio
 from restir_ref.transport.lobes import KINDS
 from restir_ref.transport.paths import Tracer, leaves, trace
@@ -76,7 +76,7 @@ def _roughness(r: float) -> str:
 
 
 def lights(ax: "Axes", scene: Scene, most: int = 4) -> None:
-    """Lights as broad bars with a word each on the side they shine to; more than `most` share one word."""
+    """Lights as broad bars, each with a word on the side they shine to; more than `most` share one word."""
     from matplotlib.collections import LineCollection
 
     lamps = scene.lights
@@ -88,16 +88,16 @@ def lights(ax: "Axes", scene: Scene, most: int = 4) -> None:
         for k in range(len(ends)):
             _word(ax, "light", middle[:, k], n[:, k])
     else:
-        _word(ax, f"{len(ends)} lights", middle.mean(axis=1), n.mean(axis=1))
+        _word(ax, f"{len(ends)} lights", middle.mean(axis=1), n.mean(axis=1), 10)
 
 
-def _word(ax: "Axes", text: str, at: Array, towards: Array) -> None:
-    """Text beside a point, in the given direction."""
+def _word(ax: "Axes", text: str, at: Array, towards: Array, away: float = 6) -> None:
+    """Text `away` points from a place, in the given direction."""
     x, y = np.round(towards).astype(int)
     ha, va = ("right", "center", "left")[x + 1], ("top", "center", "bottom")[y + 1]
     look = {"boxstyle": "square,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.75}
-    place: dict[str, Any] = {"xytext": (6 * x, 6 * y), "textcoords": "offset points", "ha": ha, "va": va}
-    ax.annotate(text, tuple(at), **place, fontsize=7, bbox=look, zorder=6)
+    place: dict[str, Any] = {"xytext": (away * x, away * y), "textcoords": "offset points", "ha": ha, "va": va}
+    ax.annotate(text, tuple(at), **place, fontsize=8, bbox=look, zorder=6)
 
 
 def view(ax: "Axes", setting: Setting, n: int) -> None:
@@ -181,21 +181,24 @@ def bundle_picture(ax: "Axes", setting: Setting, t: Tracer, u: Array, pixel: Arr
 
 
 def fluence_picture(ax: "Axes", setting: Setting, values: Array, percentile: float = 99.0) -> "Colorbar":
-    """A fluence map (rows, columns), row 0 at the bottom, tone mapped, with the scene on top; returns its scale.
+    """A fluence map (rows, columns), row 0 at the bottom, with the scene on top; returns its logarithmic scale.
 
     Fluence is radiance integrated over all directions of the plane: radiance x radians.
+    What is darker or brighter than the scale has the tone of its end.
     """
-    from matplotlib.colors import FuncNorm
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import NullLocator
 
-    e, top = exposure(values, percentile), float(max(values.max(), 1e-12))
-    norm = FuncNorm((lambda L: tone(np.asarray(L), e), lambda s: untone(np.asarray(s), e)), 0.0, top)
+    low, high = fluence_limits(values, percentile)
+    norm, values = LogNorm(low, high), np.maximum(values, low)
     (x, y), (X, Y) = setting.low, setting.high
     image = ax.imshow(values, cmap="cividis", norm=norm, origin="lower", extent=(x, X, y, Y), interpolation="nearest")
     for look in ({"color": "k", "lw": 2.0}, {"color": "w", "lw": 0.9}):
-        outline(ax, setting.scene, ls="-", **look)
+        outline(ax, setting.scene, ls="-", label="_outline", **look)
     measure(ax)
     scale = ax.inset_axes((1.03, 0.0, 0.04 * (Y - y) / (X - x), 1.0))
-    bar = _figure(ax).colorbar(image, cax=scale, ticks=fluence_ticks(e, top), format="%g")
+    bar = _figure(ax).colorbar(image, cax=scale, ticks=fluence_ticks(low, high), format="%g", extend="both")
+    bar.ax.yaxis.set_minor_locator(NullLocator())
     bar.set_label("fluence (radiance × rad)")
     return bar
 
@@ -206,9 +209,19 @@ def _figure(ax: "Axes") -> "Figure":
     return figure
 
 
-def fluence_ticks(exposure: float, top: float, count: int = 5) -> Array:
-    """Round numbers about equally spaced on the scale from 0 to `top`."""
-    wanted = untone(np.linspace(0, float(tone(np.asarray(top), exposure)), count + 1)[1:], exposure)
-    size = 10.0 ** np.floor(np.log10(np.maximum(wanted, 1e-300)))
-    rounded = np.floor(ratio(wanted, size) * 2) / 2 * size
-    return np.unique(np.append(rounded, 0.0))
+def fluence_limits(values: Array, percentile: float = 99.0, least: float = 10.0) -> tuple[float, float]:
+    """Between which fluences a map shows its tones: percentiles of the lit places, at least a factor `least` apart."""
+    lit = values[values > 0]
+    if not lit.size:
+        return 1.0, least
+    low, high = np.percentile(lit, [100 - percentile, percentile])
+    spread = max(1.0, float(np.sqrt(least * low / high)))
+    return float(low) / spread, float(high) * spread
+
+
+def fluence_ticks(low: float, high: float, count: int = 5) -> Array:
+    """Round numbers between `low` and `high`, about equally spaced on a scale of logarithms."""
+    wanted = np.geomspace(low, high, count)
+    size = 10.0 ** np.floor(np.log10(wanted))
+    rounded = np.round(ratio(wanted, size) * 2) / 2 * size
+    return np.unique(rounded[(rounded >= low) & (rounded <= high)])

@@ -12,8 +12,8 @@ from figures.claims.verdicts import Record
 from figures.engine import disk, record, store
 from figures.engine.plan import Plan, arms, arrays_path, key, read_chunks
 
-Draw = Callable[[Figure, Arrays, Sequence[Claim]], Mapping[str, bytes]]
-"""A figure, its arrays and its judged claims -> files of pictures by name; drawing is nothing the engine knows."""
+Draw = Callable[[Figure, Arrays], Mapping[str, bytes]]
+"""A figure and its arrays -> files of pictures by name; drawing is nothing the engine knows."""
 
 
 def finish(plan: Plan, ledger: Mapping[str, Row], draw: Draw) -> Record:
@@ -23,7 +23,7 @@ def finish(plan: Plan, ledger: Mapping[str, Row], draw: Draw) -> Record:
         refuse_void(plan, chunks)
         arrays = store.plain(plan.figure.combine(plan.data, chunks))
         claims = judged(plan, arrays)
-        pictures = draw(plan.figure, arrays, claims)
+        pictures = draw(plan.figure, arrays)
     except Exception:
         return crash(plan, ledger, traceback.format_exc())
     store.save(arrays_path(plan), arrays, key(plan))

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -70,18 +69,6 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "ReSTIR GI": Method(RECONNECTION, RadianceIntegrals),
     }
 )
-
-
-LOOKS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
-    {
-        "path tracing": {"color": "#E69F00", "ls": "-."},
-        "ReSTIR GI": {"color": "#56B4E9", "ls": (0, (5, 1, 1, 1, 1, 1))},
-        "reconnection": {"color": "#D55E00", "ls": "--"},
-        "no distance test": {"color": "#000000", "ls": ":"},
-        "hybrid": {"color": "#0072B2", "ls": "-"},
-    }
-)
-"""Lines of the methods in pictures."""
 
 
 def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:

@@ -196,9 +196,9 @@ def draw_integrands(axes: "Axes", toy: str) -> None:
     """f_1, f_2 and where they differ."""
     x, line = np.linspace(-2, 2, 801), TOYS[toy]()
     f = [line.f(np.full(801, k), x) for k in (0, 1)]
-    axes.fill_between(x, abs(f[0] - f[1]), color="#999999", lw=0, label="$|f_1 - f_2|$")
-    for k, look in ((0, "-"), (1, "--")):
-        axes.plot(x, f[k], ls=look, marker="", label=f"$f_{k + 1}$")
+    axes.fill_between(x, abs(f[0] - f[1]), color=style.GREY, lw=0, label="$|f_1 - f_2|$")
+    for k in (0, 1):
+        axes.plot(x, f[k], **style.look(f"$f_{k + 1}$", marker=""))
     axes.set(xlabel="$x$ (length)", ylabel="integrand (per unit length)", title=TITLES[toy])
     axes.legend()
 
@@ -207,8 +207,8 @@ def draw_chosen(axes: "Axes", chosen: Array, M: int) -> None:
     """Histograms of the positions chosen by one method or the other."""
     bins, repeats = np.linspace(-2, 2, 61), chosen.shape[-1]
     after, with_ = (100 * np.histogram(x, bins)[0] / x.size for x in (chosen[:2], chosen[2]))
-    axes.stairs(after, bins, fill=True, color="#bbbbbb", label="after")
-    axes.stairs(with_, bins, color="#0072B2", lw=1.5, label="with")
+    axes.stairs(after, bins, fill=True, color=style.LOOKS["after"].colour, label="after")
+    axes.stairs(with_, bins, color=style.LOOKS["with"].colour, lw=1.5, label="with")
     axes.set(xlabel="$x$ (length)", ylabel="chosen samples per bin (%)", title=f"{repeats} repeats, $M$ = {M}")
     axes.set_ylim(0, 1.2 * max(after.max(), with_.max()))
     axes.legend(ncols=2, loc="upper center")
@@ -217,11 +217,11 @@ def draw_chosen(axes: "Axes", chosen: Array, M: int) -> None:
 def draw_variance(axes: "Axes", a: Arrays, toy: int) -> None:
     """Exact curves with their floors, markers for the real passes."""
     for k, name in enumerate(METHODS):
-        (curve,) = axes.loglog(a["M"], a["variance"][toy, k], marker="", label=name)
-        look: dict[str, Any] = {"ls": "", "marker": style.MARKERS[k], "color": curve.get_color(), "markevery": 1}
-        axes.errorbar(a["M_real"], a["sampled"][toy, k], 2 * a["sampled_error"][toy, k], **look)
+        axes.loglog(a["M"], a["variance"][toy, k], **style.look(name, marker=""))
+        real = style.look(name, ls="", label=None)
+        axes.errorbar(a["M_real"], a["sampled"][toy, k], 2 * a["sampled_error"][toy, k], **real, markevery=1)
     for floor, label in zip(a["floors"][toy], ("floors, $M \\to \\infty$", None), strict=True):
-        axes.axhline(floor, color="#666666", lw=0.9, ls=":", label=label)
+        axes.axhline(floor, color=style.GREY, lw=1, ls=":", marker="", label=label)
     axes.set(
         xlabel="candidates $M$ per pixel or pair",
         ylabel="variance of the difference (integral$^2$)",

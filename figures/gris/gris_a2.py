@@ -213,14 +213,14 @@ def check_mismatch(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """The three problems side by side."""
-    picture, axes = style.panels(1, 3, height=3.4)
+    picture, axes = style.panels(1, 3, height=3.7)
     draw_candidates(axes[0, 0], a)
     draw_domains(axes[0, 1], a)
     floor = axes[0, 2]
     floor.loglog(a["M_wave"], a["wave"], label="Var$[f(Y) W_Y]$")
-    floor.axhline(a["limit"], color="k", ls="--", lw=1, label=r"limit: Var$[f(X)/\bar p(X)]$")
+    floor.axhline(a["limit"], color=style.INK, ls="--", marker="", lw=1, label=r"limit: Var$[f(X)/\bar p(X)]$")
     floor.set(ylim=(0.05, 0.5), xlabel="candidates $M$", ylabel="variance", title=r"$\hat p$ not proportional to $f$")
-    floor.legend()
+    style.below(floor, ncols=1)
     return picture
 
 
@@ -228,26 +228,26 @@ def draw_candidates(axes: Any, a: Arrays) -> None:
     """Distances over M, in one colour per pixel."""
     for i, (l1, mean_square) in enumerate(zip(a["l1"], a["mean_square"], strict=True)):
         null_share = f", {a['null'][i]:.0%} null" if a["null"][i] else ""
-        look = {"color": style.COLOURS[i], "marker": style.MARKERS[i]}
-        axes.loglog(a["M"], l1, **look, ls="-", label=f"pixel {i + 1}{null_share}")
-        axes.loglog(a["M"], mean_square, **look, ls=":")
+        look = style.nth(i)
+        axes.loglog(a["M"], l1, **look | {"ls": "-"}, label=f"pixel {i + 1}{null_share}")
+        axes.loglog(a["M"], mean_square, **look | {"ls": ":"})
     axes.set(xlabel="candidates $M$", title="Solid: L1, dotted: mean square")
     axes.set_ylabel(r"distance from $\bar p$ of the law of $Y \neq$ null")
-    axes.legend()
+    style.below(axes)
 
 
 def draw_domains(axes: Any, a: Arrays) -> None:
     """L1 distances and mean-square errors over n."""
     for mis, l1 in zip(ROBUST, a["domain_l1"], strict=True):
-        axes.loglog(a["n"], l1, label=f"L1, {mis}")
-    for error, name in zip(a["error"], ("f", r"\sqrt{f}"), strict=True):
-        axes.loglog(a["n"], error, label=rf"mean square, $\hat p = {name}$")
+        axes.loglog(a["n"], l1, **style.look(mis, label=f"L1, {mis}"))
+    for k, (error, name) in enumerate(zip(a["error"], ("f", r"\sqrt{f}"), strict=True)):
+        axes.loglog(a["n"], error, **style.nth(3 + k, label=rf"mean square, $\hat p = {name}$"))
     axes.set(
         xlabel="samples per pixel $n$, $M = 7n$",
         ylabel=r"distance from the limit (relative)",
         title="Seven overlapping domains",
     )
-    axes.legend()
+    style.below(axes)
 
 
 EXACT = {

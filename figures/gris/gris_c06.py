@@ -185,27 +185,35 @@ def _correlated(k: int, a: Arrays) -> Claim:
 
 def draw(a: Arrays) -> "Picture":
     """Correlation over lag, spread of the mean over frames, distribution of samples."""
-    picture, axes = style.panels(1, 3, width=3.7, height=3.0)
+    picture, axes = style.panels(1, 3, width=3.7, height=3.5)
     lags, means, shares = axes[0]
     for k, cap in enumerate(CAPS):
-        (curve,) = lags.plot(LAGS, a["rho"][k], marker="", label=f"$M_c = {cap}$")
-        look = {"ls": "", "marker": style.MARKERS[k], "color": curve.get_color(), "markevery": 4, "ms": 3.5}
-        lags.plot(LAGS, a["sampled"][k], **look)
-        means.loglog(a["t"], a["sd"][k], marker="", label=f"$M_c = {cap}$")
+        name = style.cap(cap)
+        lags.plot(LAGS, a["rho"][k], **style.look(name, marker=""))
+        lags.plot(LAGS, a["sampled"][k], **style.look(name, ls="", label=None), markevery=4, ms=3.5)
+        means.loglog(a["t"], a["sd"][k], **style.look(name, marker=""))
     lags.set(xlabel="lag $k$ (frames)", ylabel="correlation", title="Lines exact, markers the real code")
     lags.legend()
     means.set(xlabel="frames averaged $t$", ylabel="relative sd of their mean", title="Temporal reuse alone, exact")
     means.legend()
     edges = np.linspace(0, 1, BINS + 1)
     drawn = a["counts"].mean(axis=0) / 64
-    shares.stairs(BINS * a["single"], edges, color="#D55E00", ls="--", lw=1.5, label="samples of single frames")
-    shares.stairs(BINS * a["weighted"], edges, color="#0072B2", lw=2, label="drawn from all frames")
-    shares.plot((edges[1:] + edges[:-1]) / 2, BINS * drawn, "k.", ms=4, markevery=1, label="one draw per pixel and run")
+    shares.stairs(BINS * a["single"], edges, color=style.VERMILLION, ls="--", lw=1.5, label="samples of single frames")
+    shares.stairs(BINS * a["weighted"], edges, color=style.BLUE, lw=2, label="drawn from all frames")
+    shares.plot(
+        (edges[1:] + edges[:-1]) / 2,
+        BINS * drawn,
+        ".",
+        color=style.INK,
+        ms=4,
+        markevery=1,
+        label="one draw per pixel and run",
+    )
     shares.set(
         xlabel="$F_i(Y)$, uniform for $Y \\sim f_i / ||f_i||$", ylabel="density", title="64-pixel image, $M_c = 20$"
     )
     shares.set_ylim(0.5, 1.7)
-    shares.legend()
+    style.below(shares, ncols=1)
     return picture
 
 

@@ -87,31 +87,39 @@ def check(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """The neighbours' sampler, and variances over how much it lacks."""
-    picture, axes = style.panels(1, 2, width=4.2, height=3.1)
-    toy, curves = axes[0]
+    picture, axes = style.panels(1, 3, width=3.8, height=3.1)
+    toy, curves, mild = axes[0]
     line, x = overstating_neighbours(0.1), np.linspace(0, 1, 500, endpoint=False)
     toy.plot(
         x,
         line.target(np.full(500, 3), x) / integral(line, 3),
         marker="",
-        color="k",
+        color=style.INK,
         ls="-",
         label=r"target $\bar p$, all pixels",
     )
-    toy.plot(x, line.pdf(np.full(500, 3), x), marker="", color="#0072B2", ls="--", label="sampler of the centre")
-    toy.plot(x, line.pdf(np.full(500, 0), x), marker="", color="#D55E00", ls=":", label="of the neighbours (share 10%)")
+    toy.plot(x, line.pdf(np.full(500, 3), x), marker="", color=style.BLUE, ls="--", label="sampler of the centre")
+    toy.plot(
+        x,
+        line.pdf(np.full(500, 0), x),
+        marker="",
+        color=style.VERMILLION,
+        ls=":",
+        label="of the neighbours (share 10%)",
+    )
     toy.set(xlabel="$x$ (unit interval)", ylabel="density (per unit length)", title="Neighbours that overstate")
     toy.set_ylim(0, 4)
     toy.legend(loc="upper left")
     for k, name in enumerate(NAMES):
-        (curve,) = curves.loglog(
-            SHARES, a["harsh"][k, :, 1], marker="", label=name, lw=2.5 if name == "talbot" else 1.5
-        )
-        look = {"ls": "", "marker": style.MARKERS[k], "color": curve.get_color(), "fillstyle": "none"}
-        curves.plot(0.1, a["sampled"][k, 1], markevery=1, **look)
-        curves.axhline(a["mild"][k, 1], color=curve.get_color(), ls=curve.get_linestyle(), lw=0.7)
+        curves.loglog(SHARES, a["harsh"][k, :, 1], **style.look(name, marker="", lw=3 - k))
+        real = style.look(name, ls="", label=None, fillstyle="none", ms=9 - 2 * k)
+        curves.plot(0.1, a["sampled"][k, 1], markevery=1, **real)
+        bars = mild.bar(name, a["mild"][k, 1], **style.bar(name, label=None))
+        mild.bar_label(bars, fmt="%.3f")
     curves.set(xlabel="share of the promised density", ylabel="relative variance of $f(Y) W_Y$")
-    curves.set_title("Thin: overlapping_supports; markers: real code")
+    curves.set_title("The insurance; markers: real code")
+    mild.set(xlabel="MIS weights", ylabel="relative variance of $f(Y) W_Y$", title="The premium: overlapping_supports")
+    mild.grid(visible=False, axis="x")
     curves.legend(loc="upper right")
     return picture
 

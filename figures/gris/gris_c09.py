@@ -98,11 +98,12 @@ def check(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """Error over frames, beside 1/T."""
-    picture, axes = style.panels(1, 1, width=4.6, height=3.2)
-    for scene in SCENES:
-        axes[0, 0].loglog(a[f"{scene}.T"], a[f"{scene}.error"], label=scene.replace("_", " "))
+    picture, axes = style.panels(1, 1, width=7.0, height=4.0)
+    for k, scene in enumerate(SCENES):
+        look = style.nth(k, label=scene.replace("_", " "), markevery=1)
+        axes[0, 0].loglog(a[f"{scene}.T"], a[f"{scene}.error"], **look)
     T = a[f"{SCENES[0]}.T"]
-    axes[0, 0].loglog(T, a[f"{SCENES[0]}.error"][0] / T, color="k", lw=0.8, ls=":", marker="", label="1 / T")
+    axes[0, 0].loglog(T, a[f"{SCENES[0]}.error"][0] / T, color=style.INK, lw=1, ls=":", marker="", label="1 / T")
     axes[0, 0].set(xlabel="independent offline frames T", ylabel="mean square error", title="Hybrid shift, offline")
     axes[0, 0].legend()
     return picture

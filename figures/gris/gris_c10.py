@@ -190,11 +190,11 @@ FAR = "All connections across the gap are between 3% and 5% long; they are not n
 def draw(a: Arrays) -> "Picture":
     """Error per pixel in every loop, and in the gap."""
     loops = [loop for loop in LOOPS if f"{loop}.0" in a]
-    picture, axes = style.panels(1, len(loops) + 1, width=4.2, height=3.2)
+    picture, axes = style.panels(1, len(loops) + 1, width=4.2, height=3.6)
     for axis, loop in zip(axes[0], loops, strict=False):
         curves = {d: a[f"{loop}.{d:g}"] for d in DISTANCES}
         _profile(axis, curves, a["wedge.clearance"])
-        axis.set(xlabel="pixel: floor, then slope (corner grey: d = 5%, 1%)", title=f"Wedge, {loop}")
+        axis.set(xlabel="pixel: floor, then slope", title=f"Wedge, {loop}")
     ends = (DISTANCES[0], DISTANCES[-1])
     curves = dict(zip(ends, a["gap.error"], strict=True))
     _profile(axes[0, -1], curves, a["gap.clearance"])
@@ -204,16 +204,17 @@ def draw(a: Arrays) -> "Picture":
 
 def _profile(axis: "Axes", curves: dict[float, Array], clear: Array) -> None:
     """relMSE of four pixels each."""
-    for d, shade in ((DISTANCES[-1], "#eeeeee"), (DISTANCES[1], "#cccccc")):
+    for d, shade in ((DISTANCES[-1], 0.2), (DISTANCES[1], 0.6)):
         places = np.flatnonzero(clear < d)
         if len(places):
-            axis.axvspan(places[0], places[-1] + 1, color=shade, lw=0, zorder=0)
+            name = f"nearer than {d:.0%}"
+            axis.axvspan(places[0], places[-1] + 1, color=style.GREY, alpha=shade, lw=0, zorder=0, label=name)
     for d, error in curves.items():
         k, x = DISTANCES.index(d), np.arange(2, len(clear), 4)
-        look: dict[str, Any] = {"color": style.COLOURS[k], "ls": style.LINES[k], "marker": style.MARKERS[k]}
-        axis.semilogy(x, error.mean(axis=0).reshape(-1, 4).mean(axis=1), label=f"d = {d:.0%} of the room", **look)
+        look = style.nth(k)
+        axis.semilogy(x, error.mean(axis=0).reshape(-1, 4).mean(axis=1), label=f"least distance {d:.0%}", **look)
     axis.set(ylabel="relMSE of 4 pixels")
-    axis.legend()
+    style.below(axis)
 
 
 VIEW = "corner of slope and floor (FS4), 256 pixels; all three loops, and a gap below furniture beside them"

@@ -168,36 +168,32 @@ def draw(a: Arrays) -> "Picture":
     return picture
 
 
+LOOKS = {"real time": style.nth(2, ls="", label="real time"), "offline": style.nth(5, ls="", label="offline")}
+
+
 def _ratios(axis: "Axes", a: Arrays) -> None:
-    looks: dict[str, dict[str, Any]] = {
-        "real time": {"color": "#0072B2", "marker": "o"},
-        "offline": {"color": "#E69F00", "marker": "s"},
-    }
     for k, loop in enumerate(LOOPS):
         pairs = [errors(a, scene, loop) for scene in JUDGED]
         found = [criteria.ratio_interval(*pair) for pair in pairs]
         low, high = (np.array([each[i] for each in found]) for i in (0, 1))
         x = np.arange(len(JUDGED)) + 0.16 * (k - 0.5)
         value = np.array([hybrid.mean() / reconnection.mean() for hybrid, reconnection in pairs])
-        axis.errorbar(x, value, yerr=[value - low, high - value], ls="", markevery=1, label=loop, **looks[loop])
-    axis.axhline(1, color="#888888", lw=0.8, marker="")
+        axis.errorbar(x, value, yerr=[value - low, high - value], markevery=1, **LOOKS[loop])
+    axis.axhline(1, color=style.INK, ls=":", lw=1, marker="", label="shifts alike")
     axis.set_xticks(np.arange(len(JUDGED)), JUDGED)
     axis.set_xlim(-0.6, len(JUDGED) - 0.4)
-    axis.set(ylabel="relMSE, hybrid / reconnection", title="Gain by the better shift (bars: 95%)", ylim=(0, None))
-    axis.legend(loc="upper left")
+    axis.set(xlabel="scene", ylabel="relMSE, hybrid / reconnection", title="Gain by the better shift (bars: 95%)")
+    axis.set_ylim(0, 1.25 * axis.get_ylim()[1])
+    axis.legend(loc="upper left", ncols=3)
 
 
 def _rays(axis: "Axes", a: Arrays) -> None:
-    looks: dict[str, dict[str, Any]] = {
-        "hybrid": {"color": "#0072B2"},
-        "reconnection": {"color": "#ffffff", "edgecolor": "#D55E00", "hatch": "//"},
-    }
     for k, shift in enumerate(SHIFTS):
         count = a[f"{ONE}.{shift}.needed"]
         share = count / count.sum()
         mean, late = float(a[f"{ONE}.{shift}.mean"]), int(np.searchsorted(np.cumsum(share), 0.95))
         label = f"{shift}: mean {mean:.2f}, 95% at most {late}"
-        axis.bar(np.arange(len(share)) + 0.4 * (k - 0.5), share, 0.38, label=label, **looks[shift])
+        axis.bar(np.arange(len(share)) + 0.4 * (k - 0.5), share, 0.38, **style.bar(shift, label=label))
     axis.set(xlabel="rays per shift, if nothing ends it early", ylabel="share of shifts", title=f"Cost in {JUDGED[0]}")
     axis.set_ylim(0, 1.3)
     axis.grid(visible=False, axis="x")

@@ -116,21 +116,24 @@ def _largest(mis: str, over: Array) -> str:
 
 def draw(a: Arrays) -> "Picture":
     """How the variance with both maps compares with the worse map."""
-    picture, axes = style.panels(1, 2, width=4.2, height=3.4)
+    picture, axes = style.panels(1, 2, width=4.2, height=3.8)
     titles = ("Confidence shared by both shifts", "Each shift counted fully")
     for axis, over, title in zip(axes[0], a["over"], titles, strict=True):
         for mis, values in zip(ROBUST, over, strict=True):
-            axis.plot(np.sort(values), (np.arange(len(values)) + 1) / len(values), marker="", label=mis)
-        axis.axvline(1, color="k", lw=0.8)
+            axis.plot(np.sort(values), (np.arange(len(values)) + 1) / len(values), **style.look(mis, marker=""))
+        axis.axvline(1, color=style.INK, lw=1, ls=(0, (1, 1)), marker="", label=BORDER)
         axis.set(
             xlim=(0, 2),
             xlabel=r"Var$[\sum w]$ with both shifts over the larger single one",
             ylabel="fraction of scenes",
             title=title,
         )
-    axes[0, 0].legend(loc="upper left")
+    for axis in axes[0]:
+        style.below(axis)
     return picture
 
+
+BORDER = "as the worse shift"
 
 FIGURE = Figure(
     id="GRIS-C15",

@@ -66,18 +66,22 @@ def check(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """Images of several replicas, and correlations over distance."""
-    picture, axes = style.panels(1, 3, width=4.0, height=3.2)
+    picture, axes = style.panels(1, 3, width=4.0, height=3.6)
     _rows(axes[0, 0], a, PT, f"{PT}, equal rays")
     _rows(axes[0, 1], a, "hybrid", f"ReSTIR PT, frame {realtime.FRAMES}")
     curves, distance = axes[0, 2], np.arange(1, REACH + 1)
     for name, label in NAMES.items():
-        curves.plot(distance, a[f"{name}.correlation"], markevery=6, label=label)
-    curves.axhline(0.3, color="#888888", lw=0.8, ls="--", marker="")
-    curves.axhline(0.05, color="#888888", lw=0.8, ls=":", marker="")
+        curves.plot(
+            distance,
+            a[f"{name}.correlation"],
+            **style.look(label.partition(",")[0], **LOOKS.get(name, {}), label=label),
+        )
+    for level, what, ls in ((0.3, "alike: above", (0, (1, 1))), (0.05, "independent: below", (0, (6, 1)))):
+        curves.axhline(level, color=style.GREY, lw=1, ls=ls, marker="", label=f"{what} {level}")
     curves.set(
         xlabel="distance (pixels)", ylabel="correlation of errors", title="How alike the errors are", ylim=(-0.1, 1)
     )
-    curves.legend(loc="upper right")
+    style.below(curves)
     return picture
 
 
@@ -89,13 +93,14 @@ NAMES = {
 }
 
 
+LOOKS = {"hybrid, frame 1": {"marker": "v", "ls": ":"}}
+
+
 def _rows(axis: "Axes", a: Arrays, name: str, title: str) -> None:
     """Six replicas below the reference."""
-    rows = np.stack([a["reference"], *a[f"{name}.images"]])
-    shown, high = np.repeat(rows, 4, axis=0), 2 * a["reference"].max()
-    axis.imshow(shown, vmin=0, vmax=high, aspect="auto", extent=(0, rows.shape[1], len(rows), 0))
-    axis.set_yticks(np.arange(len(rows)) + 0.5, ["reference", *(f"run {k}" for k in range(1, len(rows)))])
-    axis.grid(visible=False)
+    rows = [a["reference"], *a[f"{name}.images"]]
+    names = ["reference", *(f"run {k}" for k in range(1, len(rows)))]
+    style.strips(axis, rows, names, 2 * a["reference"].max(), len(rows[0]))
     axis.set(xlabel="pixel of the inset", title=title)
 
 

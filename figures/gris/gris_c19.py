@@ -111,11 +111,12 @@ def draw(a: Arrays) -> "Picture":
     mean, error = a["estimates"].mean(axis=1), a["estimates"].std(axis=1, ddof=1) / np.sqrt(a["estimates"].shape[1])
     for axis, start, title in ((axes[0, 0], 0, "Six temporal merges"), (axes[0, 1], 2, "One spatial pass, 64 pixels")):
         pair = slice(start, start + 2)
-        axis.errorbar([0, 1], mean[pair], 4 * error[pair], ls="", marker="o", color="#0072B2", capsize=5)
-        axis.axhline(1, color="k", lw=0.8)
+        axis.errorbar([0, 1], mean[pair], 4 * error[pair], ls="", marker="o", color=style.BLUE, capsize=5)
+        axis.axhline(1, **style.look("truth"))
+        axis.legend(loc="upper center")
         axis.set_xticks([0, 1], [name.replace(" ", "\n", 1) for name in NAMES[pair]])
         axis.set(xlim=(-0.6, 1.6), xlabel="rule", ylabel="mean / truth (bars: 4 SE)", title=title)
-        axis.set_ylim(0.9, 1.05 * mean[pair].max())
+        axis.set_ylim(0.9, 1.1 * mean[pair].max())
     return picture
 
 

@@ -182,13 +182,13 @@ def draw(a: Arrays) -> "Picture":
     passes, frames, table = axes[0]
     shown = [k for k in range(len(SETUPS)) if k != 1]
     for k in shown:
-        passes.loglog(COUNTS, a["variance"][k], label=list(SETUPS)[k], markevery=1)
+        passes.loglog(COUNTS, a["variance"][k], label=list(SETUPS)[k].replace("p_hat", r"$\hat p$"), markevery=1)
     passes.set(xlabel="samples per pixel $n$", ylabel="relative variance of $f(Y) W_Y$", title="One pass")
     passes.set_ylim(None, 4000 * a["variance"].max())
     passes.legend(loc="upper right")
     t = np.arange(1, a["sd"].shape[1] + 1)
     for sd, name in zip(a["sd"], ("$M_c = 20$", "no cap"), strict=True):
-        frames.loglog(t, sd, marker="", label=name)
+        frames.loglog(t, sd, **style.look(name, marker=""))
     frames.set(xlabel="frames averaged $t$", ylabel="relative sd of their mean", title="Two pixels, time and space")
     frames.legend(loc="lower left")
     _table(table, a["numbers"])
@@ -201,11 +201,11 @@ def _table(axis: Any, numbers: Array) -> None:
     for x, head in ((0.5, "limit"), (0.72, "intact"), (0.94, "broken")):
         axis.text(x, -0.4, head, ha="right", weight="bold", fontsize=8)
     for k, (condition, broken) in enumerate(zip(CONDITIONS, BROKEN, strict=True)):
-        axis.text(0, k + 0.15, condition, fontsize=8)
-        axis.text(0, k + 0.5, f"broken: {broken}", fontsize=6.5, color="#555555")
+        axis.text(0, k + 0.1, condition, fontsize=8.5, weight="bold")
+        axis.text(0, k + 0.5, f"broken: {broken}", fontsize=8, color=style.INK)
         for x, value in ((0.5, CHECKS[k][1]), (0.72, numbers[0, k]), (0.94, numbers[1, k])):
-            axis.text(x, k + 0.15, f"{value:.2g}", ha="right", fontsize=8)
-        axis.axhline(k + 0.7, color="#bbbbbb", lw=0.6)
+            axis.text(x, k + 0.1, f"{value:.2g}", ha="right", fontsize=8.5)
+        axis.axhline(k + 0.7, color=style.GREY, lw=0.6)
 
 
 FIGURE = Figure(

@@ -195,17 +195,18 @@ def draw(a: Arrays) -> "Picture":
     picture, axes = style.panels(1, 2, width=4.6, height=3.8)
     inputs, draws = axes[0]
     for name, covered, ls in zip(CAUSES, a["covered"], ("-", "--"), strict=True):
-        inputs.loglog(a["M"], covered[-1], ls=ls, color=style.COLOURS[3], marker="^", label=f"1/Z, {name}")
-        inputs.loglog(a["M"], covered[0], ls=ls, color=style.COLOURS[0], marker="o", label=f"Talbot, {name}")
+        inputs.loglog(a["M"], covered[-1], **style.look("1/Z", ls=ls, label=f"1/Z, {name}"), markevery=1)
+        inputs.loglog(a["M"], covered[0], **style.look("Talbot", ls=ls, label=f"Talbot, {name}"), markevery=1)
     inputs.set(xlabel="inputs $M$", ylabel=r"largest $\hat p(Y) W_Y$ (exact)", title="Regions that few inputs cover")
     median = np.median(a["running"], axis=1)
     for k, (problem, mis) in enumerate(DRAWN):
         if mis in ("1/Z", "talbot"):
-            look = {"color": COLOURS[problem], "ls": "-" if mis == "talbot" else "--", "marker": style.MARKERS[k % 7]}
-            draws.loglog(a["draws"], median[k], label=f"{SHORT[mis]}{problem}", **look)
+            label = f"{SHORT[mis]}{problem}".replace("p_hat", r"$\hat p$")
+            look = style.look(mis, marker=PROBLEMS[problem], label=label)
+            draws.loglog(a["draws"], median[k], **look)
     draws.set(xlabel="draws", ylabel="largest $f(Y) W_Y$ so far (median of runs)", title="Unbounded factors")
     for each in (inputs, draws):
-        each.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, fontsize=7, handlelength=3.5)
+        style.below(each)
     return picture
 
 
@@ -216,7 +217,8 @@ CAVEATS = {
     " large here is the contribution weight, c_i = 1/|R|; a large m_i is not shown alone.",
 }
 """In what respect a cause is not the paper's."""
-COLOURS = dict(zip(LINES, ("#D55E00", "#009E73", "#000000", "#0072B2"), strict=True))
+PROBLEMS = dict(zip(LINES, style.MARKERS, strict=False))
+"""Problems differ in their markers; colours and dashes are the weights'."""
 SHORT = {"1/Z": "1/Z, ", "talbot": "Talbot, "}
 
 FIGURE = Figure(

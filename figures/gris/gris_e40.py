@@ -124,17 +124,19 @@ def draw(a: Arrays) -> "Picture":
     titles = ("Realised bound", "Recursive bound")
     for axis, scenes, title in zip(axes[0], a["chains"], titles, strict=True):
         for name, values in zip(NAMES, scenes, strict=True):
-            axis.plot(np.sort(values), (np.arange(len(values)) + 1) / len(values), marker="", label=name)
-        axis.axvline(1, color="k", lw=0.8)
+            axis.plot(np.sort(values), (np.arange(len(values)) + 1) / len(values), **style.look(name, marker=""))
+        axis.axvline(1, color=style.INK, lw=1, ls=(0, (1, 1)), marker="", label=BORDER)
         axis.set(
             xscale="log",
             xlabel=r"largest $\hat p(Y) W_Y$ over its bound",
             ylabel="fraction of scenes",
             title=f"{title}, {PASSES} passes",
         )
-    axes[0, 0].legend(loc="lower right")
+    axes[0, 0].legend(loc="center right")
     return picture
 
+
+BORDER = "at the bound"
 
 FIGURE = Figure(
     id="GRIS-E40",

@@ -216,18 +216,22 @@ def draw(a: Arrays) -> "Picture":
     picture, axes = style.panels(1, 2, width=4.6, height=3.8)
     shares, sticky = axes[0]
     for k, x in enumerate(EXPONENTS):
-        look = {"color": style.COLOURS[k], "marker": style.MARKERS[k], "markevery": 1}
-        shares.loglog(a["M"], a["growing"][k, :, 0], **look, ls="-", label=f"$|R| = M^{{{x:g}}}$")
-        shares.loglog(a["M"], a["growing"][k, :, 2], **look, ls="--", mfc="none", label=f"$|R| = M^{{{x:g}}}$, bound")
+        look = style.nth(k, markevery=1)
+        bound = {**look, "ls": "--", "mfc": "none", "label": f"$|R| = M^{{{x:g}}}$, bound"}
+        shares.loglog(a["M"], a["growing"][k, :, 0], **{**look, "ls": "-"}, label=f"$|R| = M^{{{x:g}}}$")
+        shares.loglog(
+            a["M"], a["growing"][k, :, 2], **look | {"ls": "--"}, mfc="none", label=f"$|R| = M^{{{x:g}}}$, bound"
+        )
     for k, rho in enumerate(HOLD):
-        look = {"color": style.COLOURS[k], "marker": style.MARKERS[k], "markevery": 2}
-        sticky.loglog(a["M_sticky"], a["sticky"][k], **look, ls="-", label=f"hold {rho:g}")
-        sticky.loglog(a["M_sticky"], a["sticky_bound"][k], **look, ls="--", mfc="none", label=f"hold {rho:g}, bound")
+        look = style.nth(k, markevery=2)
+        bound = {**look, "ls": "--", "mfc": "none", "label": f"hold {rho:g}, bound"}
+        sticky.loglog(a["M_sticky"], a["sticky"][k], **{**look, "ls": "-"}, label=f"hold {rho:g}")
+        sticky.loglog(a["M_sticky"], a["sticky_bound"][k], **bound)
     shares.set(title="Seven domains, Talbot weights")
     sticky.set(title="Sticky chain of samples")
     for each in (shares, sticky):
         each.set(xlabel="inputs $M$", ylabel=r"Var$[\sum w]$, relative to $\|\hat p\|^2$")
-        each.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3, fontsize=7, handlelength=3.5)
+        style.below(each, ncols=3)
     return picture
 
 

@@ -131,30 +131,35 @@ def check(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """Colours, errors over T, and errors of ReSTIR frames over the cap."""
-    picture, axes = style.panels(1, 3, width=3.7, height=3.0)
+    picture, axes = style.panels(1, 3, width=3.7, height=3.3)
     patches, over_T, over_cap = axes[0]
     rows = np.concatenate([a["few"][0].T[None], a["few"][1].T[None], np.ones((1, 24, 3))])
     patches.imshow(np.clip(rows / 2, 0, 1) ** (1 / 2.2), aspect="auto", extent=(0, 24, 3, 0))
     patches.set_yticks([0.5, 1.5, 2.5], ["Eq. 46", "Eq. 47", "truth"])
     patches.grid(visible=False)
-    patches.set(xlabel="run", ylabel="estimate", title=f"Colour pixel after {int(a['T'])} frames")
+    patches.set(xlabel="run (colours as they are)", title=f"Colour pixel after {int(a['T'])} frames")
     names = (("brightness, Eq. 46", "chroma, Eq. 46"), ("brightness, Eq. 47", "chroma, Eq. 47"))
-    looks = ((("-", 3.5, "#56B4E9"), ("--", 1.5, "#D55E00")), (("-", 1.2, "#000000"), (":", 1.8, "#000000")))
     for form in (0, 1):
         for k in (0, 1):
-            ls, lw, colour = looks[form][k]
+            ls, lw, colour = LOOKS[form][k]
             over_T.loglog(FRAMES, a["exact"][form, :, k], marker="", ls=ls, lw=lw, color=colour, label=names[form][k])
             over_T.loglog(a["T"], a["sampled"][form, k], marker="os"[k], ls="", color=colour, markevery=1)
     over_T.set(xlabel="frames $T$", ylabel="mean square error", title="Lines exact, markers real code")
-    over_T.set_ylim(3e-5, None)
-    over_T.legend(loc="lower left")
+    style.below(over_T)
     for k, name in enumerate(("brightness", "chroma")):
-        over_cap.loglog(CAPS, a["exact"][1, 0, k] / a["capped"][:, k], label=name, markevery=1)
-    over_cap.axhline(1, color="k", lw=0.8)
+        over_cap.loglog(
+            CAPS,
+            a["exact"][1, 0, k] / a["capped"][:, k],
+            **style.nth(4 + k, ls=("-", "--")[k], label=name),
+            markevery=1,
+        )
+    over_cap.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="as without reuse")
     over_cap.set(xlabel="cap $M_c$", ylabel="variance without / with reuse", title="Temporal reuse with a grey target")
-    over_cap.legend()
+    style.below(over_cap)
     return picture
 
+
+LOOKS = ((("-", 3.5, style.SKY), ("--", 1.5, style.VERMILLION)), (("-.", 1.2, style.INK), (":", 1.8, style.INK)))
 
 FIGURE = Figure(
     id="GRIS-E46",

@@ -174,11 +174,11 @@ def draw(a: Arrays) -> "Picture":
 
 
 NAMES = {PT: "path tracing, equal rays", "equal time": "path tracing, equal time", GI: GI, "hybrid": "ReSTIR PT"}
-LOOKS: dict[str, dict[str, Any]] = {
-    PT: {"color": "#E69F00", "hatch": ""},
-    "equal time": {"color": "#ffffff", "hatch": "//", "edgecolor": "#E69F00"},
-    GI: {"color": "#56B4E9", "hatch": ".."},
-    "hybrid": {"color": "#0072B2", "hatch": ""},
+LOOKS = {
+    PT: style.bar(PT, label=NAMES[PT]),
+    "equal time": style.bar(PT, label=NAMES["equal time"], hatch=""),
+    GI: style.bar(GI),
+    "hybrid": style.bar("ReSTIR PT"),
 }
 
 
@@ -186,25 +186,23 @@ def _strips(axis: "Axes", a: Arrays, scene: str) -> None:
     names = [name for name in NAMES if name != "equal time"]
     rows = [a[f"{scene}.reference"], *(a[f"{scene}.{name}.image"] for name in names)]
     high = 1.5 * a[f"{scene}.reference"].max()
-    axis.imshow(np.repeat(np.stack(rows), 4, axis=0), vmin=0, vmax=high, aspect="auto", extent=(0, FILM, len(rows), 0))
-    axis.set_yticks(np.arange(len(rows)) + 0.5, ["reference", *(NAMES[name] for name in names)])
-    axis.grid(visible=False)
+    style.strips(axis, rows, ["reference", *(NAMES[name].replace(", ", ",\n") for name in names)], high, FILM)
     axis.set(xlabel="pixel of the film", title=f"{scene}, frame {realtime.FRAMES} of a moving camera")
 
 
 def _bars(axis: "Axes", a: Arrays) -> None:
-    for k, (name, label) in enumerate(NAMES.items()):
+    for k, name in enumerate(NAMES):
         x = {scene: i + 0.2 * (k - 1.5) for i, scene in enumerate(RENDERED) if f"{scene}.{name}.error" in a}
         errors = [a[f"{scene}.{name}.error"] for scene in x]
         spread = [1.96 * e.std(ddof=1) / np.sqrt(len(e)) for e in errors]
         bars = {"yerr": spread, "error_kw": {"lw": 0.8}, **LOOKS[name]}
-        axis.bar(list(x.values()), [e.mean() for e in errors], 0.19, label=label, **bars)
+        axis.bar(list(x.values()), [e.mean() for e in errors], 0.19, **bars)
     axis.set_yscale("log")
     axis.set_ylim(0.01, 6)
     labels = [f"{scene}\n{a[f'{scene}.rays'][0]:.0f} rays,\n{a[f'{scene}.rays'][1]:.1f} a tree" for scene in RENDERED]
-    axis.set_xticks(np.arange(len(RENDERED)), labels, fontsize=7.5)
+    axis.set_xticks(np.arange(len(RENDERED)), labels, fontsize=8)
     axis.grid(visible=False, axis="x")
-    axis.set(ylabel="MAPE", title="Error of that frame (bars: 95%)")
+    axis.set(xlabel="scene", ylabel="MAPE", title="Error of that frame (bars: 95%)")
     axis.legend(ncols=2, loc="upper right")
 
 

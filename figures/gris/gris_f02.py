@@ -177,18 +177,20 @@ def draw(a: Arrays) -> "Picture":
     functions, single, spread = axes[0]
     x, line = np.linspace(0, 1, 400, endpoint=False), two_pixels()
     for i in (0, 1):
-        functions.plot(x, line.target(np.full(400, i), x), label=f"$f_{i + 1}$")
+        functions.plot(x, line.target(np.full(400, i), x), **style.look(f"$f_{i + 1}$"))
     functions.set(xlabel="$x$ (unit interval)", ylabel="integrand (per unit length)", title="Two pixels")
     functions.legend()
-    for k, look in ((0, {"color": "#D55E00", "ls": "-"}), (1, {"color": "#0072B2", "ls": ":"})):
-        lines = single.semilogx(a["t"], a["few"][k], marker="", lw=1, **look)
-        lines[0].set_label(NAMES[k])
-    single.axhline(1, color="k", lw=0.8)
+    for k, name in enumerate(SHOWN[:2]):
+        look = style.look(name, marker="", lw=1, label=None)
+        lines = single.semilogx(a["t"], a["few"][k], **look)
+        lines[0].set_label(name)
+    single.axhline(1, **style.look("truth"), lw=1.5)
     single.set(xlabel="frame $t$", ylabel="mean of frames 1..$t$ / truth", title="8 chains, pixel 2")
-    single.legend()
-    for k, name in enumerate(NAMES):
-        (curve,) = spread.loglog(a["t_exact"], a["sd_exact"][k], marker="", label=name)
-        spread.loglog(a["t"], a["sd"][k], ls="", marker=style.MARKERS[k], color=curve.get_color(), markevery=1)
+    single.set_ylim(top=1.35 * single.get_ylim()[1])
+    single.legend(loc="upper right", ncols=3, columnspacing=1, handlelength=2)
+    for k, name in enumerate(SHOWN):
+        spread.loglog(a["t_exact"], a["sd_exact"][k], **style.look(name, marker=""))
+        spread.loglog(a["t"], a["sd"][k], **style.look(name, ls="", label=None), markevery=0.06)
     spread.set(
         xlabel="frame $t$", ylabel="relative sd of the mean over chains", title="Lines exact, markers the real code"
     )
@@ -196,6 +198,7 @@ def draw(a: Arrays) -> "Picture":
     return picture
 
 
+SHOWN = ("no cap", *(style.cap(M_c) for M_c in (20, 5, 1)))
 CAPS = {"caps": [0, 20, 5, 1], "exact_frames": 3000, "cells": 48}
 
 FIGURE = Figure(

@@ -165,16 +165,16 @@ def draw(a: Arrays) -> "Picture":
     table.axis("off")
     table.set(xlim=(-0.9, 3), ylim=(6.2, -0.8), title=f"Values that differ from one pass of GRIS, of N = {int(a['N'])}")
     for column, head in enumerate(HEADS):
-        table.text(column + 0.5, -0.15, head, ha="center", va="center", weight="bold", fontsize=7.5)
+        table.text(column + 0.5, -0.15, head, ha="center", va="center", weight="bold", fontsize=8)
         mean, error = a["estimates"][column].mean(), a["estimates"][column].std(ddof=1) / a["estimates"].shape[1] ** 0.5
         table.text(column + 0.5, 5.85, f"{mean:.4f} ± {error:.4f}", ha="center", va="center", fontsize=8)
     for row, (name, cells) in enumerate(ROWS):
-        table.axhline(row + 0.4, color="#bbbbbb", lw=0.6)
+        table.axhline(row + 0.4, color=style.GREY, lw=0.6)
         table.text(-0.88, row + 0.9, name, va="center", fontsize=8)
         for column, text in enumerate(cells):
             found = f"\n{int(a['differ'][column, row])} differ" if column < 2 else ""
-            table.text(column + 0.5, row + 0.9, text + found, ha="center", va="center", fontsize=7.5)
-    table.axhline(5.4, color="#bbbbbb", lw=0.6)
+            table.text(column + 0.5, row + 0.9, text + found, ha="center", va="center", fontsize=8)
+    table.axhline(5.4, color=style.GREY, lw=0.6)
     table.text(-0.88, 5.85, "mean / truth", va="center", fontsize=8)
     _densities(histogram, a["density"])
     return picture
@@ -182,9 +182,9 @@ def draw(a: Arrays) -> "Picture":
 
 def _densities(axis: Any, density: Array) -> None:
     x, edges = middles(500), np.linspace(0, 1, 51)
-    axis.plot(x, bumps(x) / bumps(middles()).mean(), marker="", color="k", ls="-", lw=1, label=r"$\bar p$, the target")
+    axis.plot(x, bumps(x) / bumps(middles()).mean(), marker="", color=style.INK, ls=":", label=r"$\bar p$, the target")
     for values, name, look in zip(
-        density, COLUMNS, ({"color": "#0072B2", "ls": "-"}, {"color": "#D55E00", "ls": "--"}), strict=True
+        density, COLUMNS, ({"color": style.BLUE, "ls": "-"}, {"color": style.VERMILLION, "ls": "--"}), strict=True
     ):
         axis.stairs(values, edges, label=f"{name} densities", lw=1.3, **look)
     axis.set(xlabel="$Y$ (unit interval)", ylabel="density (per unit length)", title="Density of the selected samples")

@@ -123,8 +123,8 @@ def draw(a: Arrays) -> "Picture":
     for i in range(line.n):
         x = points(line, 400) if i == CENTRE else np.linspace(line.low[i], line.high[i], 400, endpoint=False)
         y = line.f(np.full(400, i), x)
-        look = {"color": "k", "lw": 2} if i == CENTRE else {"color": "#888888", "lw": 0.9}
-        domains.plot(x, y, marker="", ls="-", label={CENTRE: "centre", 0: "neighbours"}.get(i), **look)
+        look = {"color": style.INK, "lw": 2, "ls": "-"} if i == CENTRE else {"color": style.GREY, "lw": 1, "ls": "--"}
+        domains.plot(x, y, marker="", label={CENTRE: "centre", 0: "neighbours"}.get(i), **look)
     domains.set(xlabel="$x$ (length)", ylabel="integrand (per unit length)", title="Seven pixels, partly overlapping")
     domains.set_ylim(0, 1.5)
     domains.legend(ncols=2)
@@ -133,13 +133,20 @@ def draw(a: Arrays) -> "Picture":
     return picture
 
 
+LOOKS = (
+    {"color": style.PURPLE, "ls": "-"},
+    {"color": style.LOOKS["1/M"].colour, "ls": style.LOOKS["1/M"].line},
+    {"color": style.VERMILLION, "ls": ":"},
+)
+
+
 def _coverages(axis: Any, a: Arrays) -> None:
     names = {"none": "no weights", "constant": "1/M", "talbot": "1/Z, Talbot, pairwise"}
     exact, middles = dict(zip(FAMILY, a["exact"], strict=True)), points(overlapping_supports(), BINS)
-    for name, colour, mark in zip(names, style.COLOURS, "-:-", strict=False):
-        axis.plot(a["y"], exact[name], marker="", ls=mark, color=colour, label=names[name])
+    for (name, label), look in zip(names.items(), LOOKS, strict=True):
+        axis.plot(a["y"], exact[name], **look, marker="", label=label)
     for k, marker in ((0, "o"), (1, "s")):
-        axis.plot(middles, a["sampled"][k], ls="", marker=marker, ms=3, color="k", alpha=0.6, markevery=1)
+        axis.plot(middles, a["sampled"][k], ls="", marker=marker, ms=3, color=style.INK, alpha=0.6, markevery=1)
     axis.set(xlabel="$y$ (length)", ylabel=r"coverage $\sum_i c_i(y)$", title="Lines exact, markers real samples")
     axis.set_ylim(0, 10.5)
     axis.legend(loc="upper left")
@@ -148,8 +155,9 @@ def _coverages(axis: Any, a: Arrays) -> None:
 def _estimates(axis: Any, estimates: Array) -> None:
     x = np.arange(len(PASSES))
     mean, error = estimates.mean(axis=1), estimates.std(axis=1, ddof=1) / np.sqrt(estimates.shape[1])
-    axis.errorbar(x, mean, 4 * error, ls="", marker="o", color="#0072B2", capsize=4)
-    axis.axhline(1, color="k", lw=0.8)
+    axis.errorbar(x, mean, 4 * error, ls="", marker="o", color=style.BLUE, capsize=4)
+    axis.axhline(1, **style.look("truth"))
+    axis.legend(loc="center right")
     axis.set_xticks(x, ["$m = 1/M$, $c = 1/Z$", "$m = c = 1/M$"])
     axis.set(xlim=(-0.6, 1.6), ylim=(0.75, 1.05), ylabel="mean / truth", title="One pass from all seven; bars: 4 SE")
     axis.set_xlabel("weights of the pass")

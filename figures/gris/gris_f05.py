@@ -145,7 +145,7 @@ def draw(a: Arrays) -> "Picture":
         shifted = pair(t, by_hand(t, 4), PIXEL, PIXEL + STEP)
         shift_picture(ax, setting, shifted)
         ax.set_title(f"{name.capitalize()}: {pair_in_words(shifted)}")
-    axes[0, 0].legend(loc="upper left", bbox_to_anchor=(1.05, 1.0))
+    style.below(axes[2, 0], ncols=3)
     return picture
 
 

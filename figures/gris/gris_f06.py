@@ -144,11 +144,12 @@ def pair(a: Arrays, scene: str, one: str, other: str, mask: Array) -> tuple[Arra
 
 def draw(a: Arrays) -> "Picture":
     """The glossy inset, and where its error lies."""
-    picture, axes = style.panels(1, 3, width=4.0, height=3.2)
+    picture, axes = style.panels(1, 3, width=4.0, height=3.6)
     _strips(axes[0, 0], a)
     _profile(axes[0, 1], a, GLOSSY, "glossy boxes (r = .15)")
     _profile(axes[0, 2], a, ROUGH, "rough boxes (r = .5)")
-    axes[0, 1].legend(loc="lower left")
+    for axis in axes[0, 1:]:
+        style.below(axis)
     return picture
 
 
@@ -156,9 +157,8 @@ def _strips(axis: "Axes", a: Arrays) -> None:
     methods = [method for scene, method in RENDERED if scene == GLOSSY]
     rows = [a[f"{GLOSSY}.reference"], *(a[f"{GLOSSY}.{method}.image"] for method in methods)]
     high = 1.5 * a[f"{GLOSSY}.reference"].max()
-    axis.imshow(np.repeat(np.stack(rows), 4, axis=0), vmin=0, vmax=high, aspect="auto", extent=(0, 128, len(rows), 0))
-    axis.set_yticks(np.arange(len(rows)) + 0.5, ["reference", *methods])
-    axis.grid(visible=False)
+    names = [name.replace("no distance ", "no distance\n") for name in methods]
+    style.strips(axis, rows, ["reference", *names], high, 128)
     axis.set(xlabel="pixel: floor, then box", title=f"{GLOSSY}, frame {realtime.FRAMES}")
 
 
@@ -166,11 +166,11 @@ def _profile(axis: "Axes", a: Arrays, scene: str, title: str) -> None:
     """relMSE over four pixels each."""
     box, x = a["box"], np.arange(2, len(a["box"]), 4)
     edges = np.flatnonzero(a["edge"])
-    axis.axvspan(edges[0], edges[-1] + 1, color="#eeeeee", zorder=0)
-    axis.axvline(float(np.argmax(box)), color="#888888", lw=0.8, marker="")
+    axis.axvspan(edges[0], edges[-1] + 1, color=style.PALE, alpha=0.6, zorder=0, label="within reach of the edge")
+    axis.axvline(float(np.argmax(box)), color=style.GREY, lw=1, marker="", ls="-", label="edge of floor and box")
     for method in (method for each, method in RENDERED if each == scene):
         error = a[f"{scene}.{method}.error"].mean(axis=0).reshape(-1, 4).mean(axis=1)
-        axis.semilogy(x, error, marker="", label=method, **realtime.LOOKS[method])
+        axis.semilogy(x, error, **style.look(method))
     axis.set(xlabel="pixel: floor, then box", ylabel="relMSE of 4 pixels", title=title)
     axis.set_ylim(1.5e-3, 1)
 

@@ -144,8 +144,13 @@ def draw(a: Arrays) -> "Picture":
     line, x = overlapping_supports(), np.linspace(0.15, 1.05, 600)
     for i in range(line.n):
         y = line.target(np.full(600, i), x)
-        look = {"color": "#000000", "lw": 2.2, "ls": "-", "label": "centre", "zorder": 3}
-        other = {"color": "#888888", "lw": 0.9, "label": "others, cut off by their domains" if i == 0 else None}
+        look = {"color": style.INK, "lw": 2.2, "ls": "-", "label": "centre", "zorder": 3}
+        other = {
+            "color": style.GREY,
+            "lw": 1,
+            "ls": "--",
+            "label": "others, cut off by their domains" if i == 0 else None,
+        }
         toy.plot(x, np.where(y > 0, y, np.nan), marker="", **(look if i == CENTRE else other))
     toy.set(
         xlabel="$x$ (length)",
@@ -155,9 +160,9 @@ def draw(a: Arrays) -> "Picture":
     )
     toy.legend(loc="upper left")
     for k, mis in enumerate(NAMES):
-        (curve,) = curves.loglog(a["n"], a["variance"][k], marker="", label=LABELS[mis])
-        look = {"ls": "", "marker": style.MARKERS[k], "color": curve.get_color(), "markevery": 1}
-        curves.errorbar(a["n_sampled"], a["sampled"][k], 2 * a["sampled_error"][k], **look)
+        curves.loglog(a["n"], a["variance"][k], **style.look(mis, marker="", label=LABELS[mis]))
+        real = style.look(mis, ls="", label=None)
+        curves.errorbar(a["n_sampled"], a["sampled"][k], 2 * a["sampled_error"][k], **real, markevery=1)
     curves.set(
         xlabel="samples per pixel $n$, $M = 7n$, $|R| = n$",
         ylabel="relative variance of $f(Y) W_Y$",

@@ -85,25 +85,25 @@ def check(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """Shifts over the size of the window, and variance over shifts for growing n."""
-    picture, axes = style.panels(1, 2, width=4.2, height=3.2)
+    picture, axes = style.panels(1, 2, width=4.4, height=3.6)
     cost, efficiency = axes[0]
     labels = {"talbot": "Talbot: $M(M-1)$", "pairwise": "pairwise: $2(M-1)$", "defensive": "defensive: $2(M-1)$"}
     fine = np.geomspace(2, 64, 100)
-    for k, name in enumerate(NAMES[:2]):
-        look = {"color": style.COLOURS[k], "ls": style.LINES[k]}
-        cost.loglog(fine, fine * (fine - 1) if name == "talbot" else 2 * (fine - 1), marker="", **look)
+    for name in NAMES[:2]:
+        look = style.look(name, marker="", label=None)
+        cost.loglog(fine, fine * (fine - 1) if name == "talbot" else 2 * (fine - 1), **look)
     for k, name in enumerate(NAMES):
         cost.loglog(
-            a["M"], a["shifts"][k], ls="", marker=style.MARKERS[k], color=style.COLOURS[k],
-            markevery=1, fillstyle="none", ms=5 + 2 * (k == 2), label=labels.get(name, "constant: $M-1$"),
+            a["M"], a["shifts"][k], **style.look(name, ls="", label=labels.get(name, "constant: $M-1$")),
+            markevery=1, fillstyle="none", ms=5 + 2 * (k == 2),
         )  # fmt: skip
-    cost.axvline(49, color="#888888", lw=0.8)
+    cost.axvline(49, color=style.GREY, ls=":", marker="", label="the paper's window, $M = 49$")
     cost.set(xlabel="inputs $M$, $|R| = 1$", ylabel="shifts per pixel", title="Cost of a pass (markers counted)")
     cost.set_xticks([2, 5, 10, 20, 49], ["2", "5", "10", "20", "49"])
     cost.minorticks_off()
-    cost.legend()
+    style.below(cost)
     for k, name in enumerate(PROPER):
-        efficiency.loglog(a["shifts_of_n"][k], a["variance"][k], label=name, markevery=1)
+        efficiency.loglog(a["shifts_of_n"][k], a["variance"][k], **style.look(name), markevery=1)
     efficiency.set(
         xlabel="shifts per pixel, counted",
         ylabel="relative variance of $f(Y) W_Y$",

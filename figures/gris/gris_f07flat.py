@@ -262,27 +262,30 @@ def squared(estimate: Array) -> Array:
 
 def draw(a: Arrays) -> "Picture":
     """Variance over n in two windows, and over the window's size."""
-    picture, axes = style.panels(1, 3, width=3.9, height=3.2)
+    picture, axes = style.panels(1, 3, width=3.9, height=3.7)
     for axis, view in zip(axes[0], SEVEN, strict=False):
         for mis in WEIGHTS:
-            axis.loglog(a["n"], variances(a, view, mis), label=mis)
+            axis.loglog(a["n"], variances(a, view, mis), **style.look(mis), markevery=1)
         axis.set(xlabel="samples $n$ per pixel", ylabel="relative variance of $f(Y) W_Y$")
         axis.set_title(f"Fig. 7: seven {view}" if "pixels" in view else f"Fig. 7: seven pixels {view}")
-    axes[0, 0].legend()
+    for axis in axes[0, :2]:
+        style.below(axis, ncols=3)
     _growing(axes[0, 2], a)
     return picture
 
 
 def _growing(axis: "Axes", a: Arrays) -> None:
     for view, mis in WIDENED:
-        k = list(GROWING).index(view)
         spread = [squared(a[named(view, mis, m)]).mean() for m in a["M"]]
-        look = {"color": style.COLOURS[k], "marker": style.MARKERS[k], "ls": "-" if mis == SPATIAL else "--"}
-        axis.loglog(a["M"], spread / spread[0], label=f"{mis}, {view}", **look)
+        look = style.look(mis, marker=MARKS[view], label=f"{mis}, {view}")
+        axis.loglog(a["M"], spread / spread[0], **look, markevery=1)
     axis.set(xlabel="pixels $M$ in the window", ylabel="relative variance of $f(Y) W_Y$ / of $M = 1$")
     axis.set_title("Fig. 8: one canonical sample")
-    axis.set_ylim(axis.get_ylim()[0] / 4, None)
-    axis.legend(fontsize=7, loc="lower left")
+    style.below(axis, ncols=1)
+
+
+MARKS = dict(zip(GROWING, style.MARKERS, strict=False))
+"""Views differ in their markers; colours and dashes are the weights'."""
 
 
 FIGURE = Figure(

@@ -130,30 +130,35 @@ LABELS = {"talbot": "generalised Talbot", "pairwise": "pairwise, uniform", "defe
 
 def draw(a: Arrays) -> "Picture":
     """The toy, the variance over the window, and both controls."""
-    picture, axes = style.panels(1, 3, width=3.7, height=3.1)
+    picture, axes = style.panels(1, 3, width=3.7, height=4.0)
     toy, window, control = axes[0]
     line, x = degrading_neighbours(), np.linspace(0, 1, 800, endpoint=False)
     for j in range(0, 65, 4):
-        look = {"color": "k", "lw": 2, "zorder": 3} if j == CENTRE else {"color": "#999999", "lw": 0.8}
-        toy.plot(x, line.f(np.full(800, j), x), marker="", ls="-", label="centre" if j == CENTRE else None, **look)
-    toy.set(xlabel="$x$ (unit interval)", ylabel="integrand (per unit length)", title="Every fourth of 65 pixels")
+        look = CENTRAL if j == CENTRE else OTHER
+        toy.plot(
+            x, line.f(np.full(800, j), x), marker="", label={CENTRE: "centre", 0: "every fourth other"}.get(j), **look
+        )
+    toy.set(xlabel="$x$ (unit interval)", ylabel="integrand (per unit length)", title="Of 65 pixels")
     toy.set_ylim(0, 1.25)
-    toy.legend(loc="upper right")
     M = 2 * np.array(RADII) + 1
     for k, name in enumerate(NAMES):
-        (curve,) = window.loglog(M, a["window"][k], marker="", label=LABELS[name])
-        mark = {"marker": style.MARKERS[k], "color": curve.get_color(), "markevery": 1}
-        window.errorbar(2 * a["radii"] + 1, a["sampled"][k], 2 * a["sampled_error"][k], ls="", **mark)
-        line_of = {"color": curve.get_color(), "ls": curve.get_linestyle(), "marker": ""}
-        control.loglog(2.5 * np.array(RADII[2:]), a["share"][k], label=f"{name}, $|R| = M/5$", **line_of)
-        control.loglog((2 * NEAREST + 1) * np.array(COPIES), a["fixed"][k], ls="-", lw=0.7, **mark)
+        window.loglog(M, a["window"][k], **style.look(name, marker="", label=LABELS[name]))
+        real = style.look(name, ls="", label=None)
+        window.errorbar(2 * a["radii"] + 1, a["sampled"][k], 2 * a["sampled_error"][k], **real, markevery=1)
+        share, copies = f"{name}, $|R| = M/5$", f"{name}, $n$ copies of 9 pixels"
+        control.loglog(2.5 * np.array(RADII[2:]), a["share"][k], **style.look(name, marker="", label=share))
+        thin = style.look(name, lw=0.8, label=copies)
+        control.loglog((2 * NEAREST + 1) * np.array(COPIES), a["fixed"][k], **thin, markevery=1)
     label = "relative variance of $f(Y) W_Y$"
     window.set(xlabel="window $M$, $|R| = 1$", ylabel=label, title="Lines exact, markers the real code")
-    window.legend()
-    control.set(xlabel="inputs $M$", ylabel=label, title="Controls; thin: 9 pixels times n")
-    control.legend()
+    control.set(xlabel="inputs $M$", ylabel=label, title="Controls")
+    for axis in (toy, window, control):
+        style.below(axis, ncols=1)
     return picture
 
+
+CENTRAL: dict[str, Any] = {"color": style.INK, "lw": 2, "ls": "-", "zorder": 3}
+OTHER: dict[str, Any] = {"color": style.GREY, "lw": 0.8, "ls": "--"}
 
 FIGURE = Figure(
     id="GRIS-F08",

@@ -229,28 +229,19 @@ def _alone(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """Frames of the image and of the ring, stationary error over the cap, and means of frames."""
-    picture, axes = style.panels(2, 2, width=4.4, height=3.1)
+    picture, axes = style.panels(2, 2, width=4.4, height=3.7)
     (frames, ring), (caps, means) = axes
     for k, cap in enumerate(CAPS):
-        look = {
-            "marker": "",
-            "color": COLOURS[k],
-            "ls": LINES[k],
-            "label": f"$M_c = {cap}$" if cap < np.inf else "none",
-        }
+        look = style.look(style.cap(cap), markevery=0.12)
         frames.loglog(a["t"], a["image"][k].mean(axis=1), **look)
         ring.loglog(np.arange(1, a["ring"].shape[1] + 1), a["ring"][k], **look)
     frames.set(xlabel="frame $t$", ylabel="relMSE of frame $t$", title="(a) 64-pixel image, real code")
     ring.set(xlabel="frame $t$", ylabel="relMSE of frame $t$", title="(a) ring of 8 pixels, exact")
-    ring.legend(ncols=2, loc="lower left")
-    ring.set_ylim(ring.get_ylim()[0] / 4, None)
+    for axis in (frames, ring):
+        style.below(axis, ncols=4)
     _caps(caps, a)
     _means(means, a)
     return picture
-
-
-COLOURS = ("#000000", "#56B4E9", "#009E73", "#0072B2", "#CC79A7", "#E69F00", "#D55E00", "#D55E00")
-LINES: tuple[Any, ...] = ("-", "--", "-.", "-", (0, (3, 1)), "--", "-", ":")
 
 
 def _caps(axis: Any, a: Arrays) -> None:
@@ -258,22 +249,21 @@ def _caps(axis: Any, a: Arrays) -> None:
     axis.loglog(x, a["stationary"].mean(axis=1), label="image, temporal and spatial", markevery=1)
     axis.loglog(x, a["ring"][:, -1], label="ring, temporal and spatial", markevery=1)
     axis.loglog(ALONE, a["alone"][:, 2], label="image, temporal alone", markevery=1)
-    axis.set_xticks(x, ["0", "1", "5", "20", "50", "200", "1000", "none"])
+    axis.set_xticks(x, ["0", "1", "5", "20", "50", "200", "1000", "no cap"])
     axis.minorticks_off()
     axis.set(xlabel="cap $M_c$", ylabel="relMSE of late frames", title="An optimum only with spatial reuse")
-    axis.set_ylim(2e-4, None)
-    axis.legend(loc="lower left")
+    style.below(axis)
 
 
 def _means(axis: Any, a: Arrays) -> None:
     for k, cap in enumerate(AVERAGED):
-        name = f"temporal and spatial, $M_c = {cap}$" if cap else "spatial only"
-        axis.loglog(a["t_mean"], a["mean"][k].mean(axis=1), marker="", label=name)
-    thin = {"marker": "", "lw": 0.7}
-    axis.loglog(a["t_ring_mean"], a["ring"][0, -1] / a["t_ring_mean"], color=style.COLOURS[0], ls="-", **thin)
-    axis.loglog(a["t_ring_mean"], a["ring_mean"], color=style.COLOURS[2], ls="-.", **thin)
-    axis.set(xlabel="frames averaged $t$", ylabel="relMSE of their mean", title="(b) bold: image; thin: ring, exact")
-    axis.legend()
+        label = f"{style.cap(cap)}{'' if cap else ', spatial only'}"
+        axis.loglog(a["t_mean"], a["mean"][k].mean(axis=1), **style.look(style.cap(cap), label=label), markevery=0.12)
+    for cap, error in ((0, a["ring"][0, -1] / a["t_ring_mean"]), (20, a["ring_mean"])):
+        label = f"{style.cap(cap)}, ring, exact"
+        axis.loglog(a["t_ring_mean"], error, **style.look(style.cap(cap), marker="", lw=1, label=label))
+    axis.set(xlabel="frames averaged $t$", ylabel="relMSE of their mean", title="(b) means of frames")
+    style.below(axis)
 
 
 FIGURE = Figure(

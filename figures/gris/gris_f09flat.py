@@ -223,7 +223,7 @@ def likeness(a: Arrays, k: int) -> float:
 
 def draw(a: Arrays) -> "Picture":
     """Frames over time, late frames over the cap, means of frames, and a frozen image."""
-    picture, axes = style.panels(2, 2, width=4.6, height=3.1)
+    picture, axes = style.panels(2, 2, width=4.6, height=3.3)
     _frames(axes[0, 0], a)
     _caps(axes[0, 1], a)
     _means(axes[1, 0], a)
@@ -231,26 +231,16 @@ def draw(a: Arrays) -> "Picture":
     return picture
 
 
-COLOURS = ("#000000", "#56B4E9", "#009E73", "#0072B2", "#CC79A7", "#E69F00", "#D55E00", "#D55E00")
-LINES: tuple[Any, ...] = ("-", "--", "-.", "-", (0, (3, 1)), "--", "-", ":")
-
-
 def _frames(axis: "Axes", a: Arrays) -> None:
     end = max(a[f"t.{k}"][-1] for k in range(1, len(CAPS)))
     for k, cap in enumerate(CAPS):
-        look = {
-            "marker": "",
-            "color": COLOURS[k],
-            "ls": LINES[k],
-            "label": f"$M_c = {cap:g}$" if cap < np.inf else "none",
-        }
+        look = style.look(style.cap(cap), markevery=0.12)
         if k == SPATIAL:
             axis.loglog([1, end], [a["late.0"].mean()] * 2, **look)
         else:
             axis.loglog(a[f"t.{k}"], a[f"frame.{k}"].mean(axis=1), **look)
     axis.set(xlabel="frame $t$", ylabel="relMSE of frame $t$", title="Frames of a still camera")
-    axis.set_ylim(0.01, 2)
-    axis.legend(ncols=4, loc="lower left", fontsize=7, columnspacing=1.0)
+    style.below(axis, ncols=4)
 
 
 def _caps(axis: "Axes", a: Arrays) -> None:
@@ -260,26 +250,25 @@ def _caps(axis: "Axes", a: Arrays) -> None:
     axis.errorbar(x, [e.mean() for e in late], yerr=spread, markevery=1)
     axis.set_xscale("log")
     axis.set_yscale("log")
-    axis.set_xticks(x, ["0", "1", "5", "20", "50", "200", "1000", "none"])
+    axis.set_xticks(x, ["0", "1", "5", "20", "50", "200", "1000", "no cap"])
     axis.minorticks_off()
     axis.set(xlabel="cap $M_c$", ylabel="relMSE of late frames", title="The second half of each chain (bars: 95%)")
 
 
 def _means(axis: "Axes", a: Arrays) -> None:
-    for k, name in ((SPATIAL, "spatial only"), (2, "$M_c = 5$"), (3, "$M_c = 20$"), (UNCAPPED, "no cap")):
+    for k in (SPATIAL, 2, 3, UNCAPPED):
+        name = style.cap(CAPS[k])
+        look = style.look(name, label=f"{name}, spatial only" if k == SPATIAL else name, markevery=0.12)
         t, error = a[f"t_mean.{k}"], a[f"mean.{k}"].mean(axis=1)
-        axis.loglog(t, error, marker="", color=COLOURS[k], ls=LINES[k], label=name)
+        axis.loglog(t, error, **look)
     axis.set(xlabel="frames averaged $t$", ylabel="relMSE of their mean", title="Means of frames")
-    axis.legend(loc="lower left")
+    style.below(axis, ncols=4)
 
 
 def _images(axis: "Axes", a: Arrays) -> None:
     rows = (a["truth"], a[f"average.{UNCAPPED}"][0], a[f"last.{UNCAPPED}"][0], a["average.3"][0], a["last.3"][0])
-    shown = np.repeat(np.stack(rows), 4, axis=0)
-    axis.imshow(shown, vmin=0, vmax=1.5 * a["truth"].max(), aspect="auto", extent=(0, PIXELS, len(rows), 0))
     names = ("reference", "no cap, mean", "no cap, last", "cap 20, mean", "cap 20, last")
-    axis.set_yticks(np.arange(len(rows)) + 0.5, names)
-    axis.grid(visible=False)
+    style.strips(axis, rows, names, 1.5 * a["truth"].max(), PIXELS)
     axis.set(xlabel="pixel of the inset", title=f"One chain after {a['t_mean.3'][-1]} frames")
 
 

@@ -69,26 +69,25 @@ def correlation(frame: Array, before: Array, truth: Array) -> float:
 
 def draw(a: Arrays) -> "Picture":
     """One run as an image and as curves, and the errors of all runs."""
-    picture, axes = style.panels(1, 3, width=3.8, height=3.0)
+    picture, axes = style.panels(1, 3, width=3.8, height=3.2)
     strips, curves, errors = axes[0]
     rows = (a["truth"], a["mean"][0, 0], a["last"][0, 0], a["mean"][1, 0], a["last"][1, 0])
-    shown = np.repeat(np.stack(rows), 4, axis=0)
-    strips.imshow(shown, vmin=0, vmax=1.5 * a["truth"].max(), aspect="auto", extent=(-0.5, 63.5, len(rows), 0))
-    labels = ("truth", "no cap, mean", "no cap, last", "cap 20, mean", "cap 20, last")
-    strips.set_yticks(np.arange(len(rows)) + 0.5, labels)
-    strips.grid(visible=False)
-    strips.set(xlabel="pixel", ylabel="image", title=f"One run after {int(a['frames'])} frames")
-    curves.plot(a["truth"], marker="", color="k", ls="-", label="truth")
-    curves.plot(a["mean"][0, 0], marker="", color="#D55E00", ls="--", label="mean, no cap")
-    curves.plot(a["mean"][1, 0], marker="", color="#0072B2", ls=":", lw=2, label="mean, $M_c = 20$")
-    curves.set(xlabel="pixel", ylabel="radiance", title="The same run")
-    curves.set_ylim(0, 1.6 * max(a["truth"].max(), a["mean"][:, 0].max()))
-    curves.legend(loc="upper right")
+    labels = ("truth", "no cap,\nmean", "no cap,\nlast", "cap 20,\nmean", "cap 20,\nlast")
+    style.strips(strips, rows, labels, 1.5 * a["truth"].max(), len(a["truth"]))
+    strips.set(xlabel="pixel", title=f"One run after {int(a['frames'])} frames")
+    curves.plot(a["truth"], **style.look("truth"))
     for k, name in enumerate(NAMES):
-        errors.loglog(np.sort(a["error"][k]), (np.arange(a["error"].shape[1]) + 0.5) / a["error"].shape[1], label=name)
+        curves.plot(a["mean"][k, 0], **style.look(name, label=f"{name}, mean"))
+    curves.set(xlabel="pixel", ylabel="radiance", title="The same run, as curves")
+    style.below(curves, ncols=3)
+    for k, name in enumerate(NAMES):
+        errors.loglog(
+            np.sort(a["error"][k]), (np.arange(a["error"].shape[1]) + 0.5) / a["error"].shape[1], **style.look(name)
+        )
     errors.set(xlabel="relMSE of the mean of one run", ylabel="share of runs below", title="All runs")
     errors.set_yscale("linear")
-    errors.legend(loc="upper center")
+    errors.tick_params(axis="x", which="minor", labelbottom=False)
+    style.below(errors)
     return picture
 
 

@@ -111,7 +111,7 @@ def longest(a: Arrays) -> int:
 
 def draw(a: Arrays) -> "Picture":
     """relMSE over frames; path tracing at equal samples, rays and time; error by pixel."""
-    picture, axes = style.panels(1, 3, width=3.9, height=3.3)
+    picture, axes = style.panels(1, 3, width=3.9, height=3.9)
     T = 2 ** np.arange(int(np.log2(longest(a))) + 1)
     for axis, (scene, title) in zip(axes[0, :2], SCENES.items(), strict=True):
         prices: dict[str, Callable[[int], float]] = {
@@ -121,16 +121,27 @@ def draw(a: Arrays) -> "Picture":
         }
         for name, trees in prices.items():
             curve = [errors(a, scene, offline.traced(a, scene, trees(int(t)))).mean() for t in T]
-            axis.loglog(T, curve, label=f"path tracing, {name}")
+            axis.loglog(
+                T, curve, **style.look("path tracing", **PRICES[name], label=f"path tracing, {name}"), markevery=1
+            )
         for method in METHODS[1:]:
-            axis.loglog(T, [errors(a, scene, offline.after(a, scene, method, int(t))).mean() for t in T], label=method)
+            after = [errors(a, scene, offline.after(a, scene, method, int(t))).mean() for t in T]
+            axis.loglog(T, after, **style.look(method), markevery=1)
         axis.set_xticks([], minor=True)
-        axis.set_xticks(T, T)
+        axis.set_xticks(T[:: 1 + len(T) // 8], T[:: 1 + len(T) // 8])
+        axis.margins(x=0.1)
         axis.set(xlabel="frames T in the mean", ylabel="relMSE of the mean", title=title)
-        axis.set_ylim(bottom=axis.get_ylim()[0] / 4)
-        axis.legend(fontsize=6.5, loc="lower left")
+        style.below(axis, ncols=1)
     by_pixel(a, axes[0, 2])
     return picture
+
+
+PRICES: dict[str, dict[str, Any]] = {
+    "equal samples": {"marker": "s", "ls": "-."},
+    "equal rays": {"marker": "^", "ls": "--"},
+    "equal time": {"marker": "v", "ls": ":"},
+}
+"""Path tracing at three prices: one colour, three markers and dashes."""
 
 
 def by_pixel(a: Arrays, axis: Any) -> None:
@@ -142,10 +153,10 @@ def by_pixel(a: Arrays, axis: Any) -> None:
     }
     for name, images in shown.items():
         error = ((images / truth - 1) ** 2).mean(axis=0).reshape(-1, 16).mean(axis=1)
-        axis.semilogy(np.arange(len(error)) * 16 + 8, error, label=name)
+        axis.semilogy(np.arange(len(error)) * 16 + 8, error, **style.look(name.partition(",")[0], label=name))
     axis.set(xlabel="pixel of the film", ylabel="relative squared error", title="One frame, rough boxes")
-    axis.set_ylim(top=2)
-    axis.legend(fontsize=6.5, loc="upper left")
+    axis.set_xticks(range(0, 1921, 480))
+    style.below(axis, ncols=1)
 
 
 FIGURE = Figure(

@@ -146,11 +146,7 @@ def whole(a: Arrays, rule: str) -> Array:
 
 
 LOOKS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
-    {
-        "per lobe": {"color": "#0072B2", "ls": "-"},
-        "averaged": {"color": "#E69F00", "ls": "--"},
-        "glossiest": {"color": "#000000", "ls": ":"},
-    }
+    {rule: style.nth(k, marker="", label=rule) for k, rule in enumerate(INTEGRALS)}
 )
 
 
@@ -161,13 +157,15 @@ def draw(a: Arrays) -> "Picture":
     for rule in INTEGRALS:
         error = corners.relative(a[f"{rule}.images"], a["indirect"]).mean(axis=0)
         smooth = np.convolve(error, np.ones(9) / 9, mode="valid")
-        left.semilogy(np.arange(4, 124), smooth, marker="", label=rule, **LOOKS[rule])
+        left.semilogy(np.arange(4, 124), smooth, **LOOKS[rule])
     left.set(xlabel="pixel of the inset", ylabel="relative squared error, 9 pixels", title="Indirect light, clear coat")
     left.legend()
     for k, rule in enumerate(INTEGRALS):
-        look = {"color": LOOKS[rule]["color"], "edgecolor": "k", "hatch": ("", "//", "..")[k]}
+        look = {"color": LOOKS[rule]["color"], "edgecolor": style.PAPER, "hatch": style.HATCHES[k]}
         right.bar(rule, a[f"{rule}.replayed"].mean(), **look)
-    right.set(ylabel="vertices replayed per shift", title="Length of replay")
+    right.set(
+        xlabel="roughness by which vertices are judged", ylabel="vertices replayed per shift", title="Length of replay"
+    )
     right.grid(axis="x", visible=False)
     return picture
 

@@ -105,22 +105,21 @@ def prices(a: Arrays) -> str:
 
 def draw(a: Arrays) -> "Picture":
     """One frame of every method, and the error per pixel."""
-    picture, axes = style.panels(2, 2, width=4.2, height=2.7)
+    picture, axes = style.panels(2, 2, width=4.4, height=3.2)
     for row, (scene, methods) in zip(axes, RENDERED.items(), strict=True):
         truth = a[f"{scene}.reference"]
-        row[0].plot(truth, color="k", lw=2.5, alpha=0.4, ls="-", marker="", label="reference")
+        row[0].plot(truth, **style.look("reference"), lw=2, zorder=3)
         for method in sorted(methods, reverse=True):
-            images, look = a[f"{scene}.{method}"], realtime.LOOKS[method]
-            label = f"{method}, equal rays" if method == PT else method
-            row[0].plot(images[0], marker="", lw=0.9, label=label, **look)
+            images = a[f"{scene}.{method}"]
+            look = style.look(method, label=f"{method}, equal rays" if method == PT else method)
+            row[0].plot(images[0], lw=0.9, markevery=8, **look)
             error = corners.relative(images, truth).mean(axis=0)
-            row[1].semilogy(
-                np.arange(4, 124), np.convolve(error, np.ones(9) / 9, mode="valid"), marker="", label=label, **look
-            )
+            row[1].semilogy(np.arange(4, 124), np.convolve(error, np.ones(9) / 9, mode="valid"), **look)
         row[0].set(xlabel="pixel of the inset", ylabel="radiance", title=f"{TITLES[scene]}: one frame")
         row[0].set_ylim(0, 2.5 * truth.max())
-        row[1].set(xlabel="pixel of the inset", ylabel="relative squared error", title="mean over frames, 9 pixels")
-        row[1].legend()
+        row[1].set(xlabel="pixel of the inset", ylabel="relative squared error", title="Mean over frames, 9 pixels")
+        for axis in row:
+            style.below(axis, ncols=3)
     return picture
 
 

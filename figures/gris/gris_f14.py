@@ -149,21 +149,15 @@ def draw(a: Arrays) -> "Picture":
     return picture
 
 
-def look(k: int) -> dict[str, Any]:
-    """Colour and marker of the k-th method."""
-    return {"color": style.COLOURS[k], "marker": style.MARKERS[k], "markevery": 1}
-
-
 def draw_images(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
     """One image of each method as a strip above the reference."""
     rows = [image[0] for image in images.values()]
-    place = (0, len(truth), len(rows) + 1, 0)
-    shown = axis.imshow([*rows, truth], vmin=0, vmax=2 * truth.max(), aspect="auto", extent=place)
-    axis.figure.colorbar(shown, ax=axis, label="radiance", extend="max")
-    axis.set_yticks(np.arange(len(rows) + 1) + 0.5, [*LABELS.values(), "reference"])
-    axis.set_xticks(range(0, len(truth) + 1, TILE))
-    axis.grid(visible=False)
-    axis.set(xlabel="pixel (ticks at borders of tiles)", title="One image each, at equal rays")
+    style.strips(axis, [*rows, truth], [*LABELS.values(), "reference"], 2 * truth.max(), len(truth))
+    axis.set_xticks(range(0, len(truth) + 1, 2 * TILE))
+    axis.set(xlabel="pixel (ticks at every other border of tiles)", title="One image each, at equal rays")
+
+
+CORRELATION = "rank correlation of errors\nof pixels $x - 1$ and $x$"
 
 
 def draw_borders(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
@@ -171,17 +165,21 @@ def draw_borders(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
     for method, image in images.items():
         error = ranks(image - truth)
         pairs = [float(correlation(error[:, x - 1], error[:, x])) for x in range(1, len(truth))]
-        axis.plot(np.arange(1, len(truth)), pairs, label=LABELS[method])
-    axis.set_xticks(range(0, len(truth) + 1, TILE))
-    axis.set(xlabel="pixel $x$ (ticks at borders of tiles)", ylabel="rank correlation of errors, $x - 1$ and $x$")
-    axis.set(title="Next neighbours", ylim=(-0.65, 1.05))
-    axis.legend(loc="lower left", ncols=2)
+        axis.plot(np.arange(1, len(truth)), pairs, **style.look(LABELS[method]), markevery=8)
+    axis.set_xticks(range(0, len(truth) + 1, 2 * TILE))
+    axis.set(
+        xlabel="pixel $x$ (ticks at every other border of tiles)",
+        ylabel="rank correlation of errors\nof pixels $x - 1$ and $x$",
+    )
+    axis.set(title="Next neighbours", ylim=(-0.25, 1.05))
+    style.below(axis, ncols=3)
 
 
 def draw_errors(axis: "Axes", images: dict[str, Array], truth: Array) -> None:
     """MAPE with the spread over images."""
-    for k, each in enumerate(mape(image, truth) for image in images.values()):
-        axis.errorbar(k, each.mean(), each.std(ddof=1), capsize=4, **look(k))
+    for k, (method, image) in enumerate(images.items()):
+        each = mape(image, truth)
+        axis.errorbar(k, each.mean(), each.std(ddof=1), capsize=4, **style.look(LABELS[method]), markevery=1)
         axis.annotate(f"{each.mean():.3f}", (k, each.mean()), (8, -3), textcoords="offset points")
     axis.set_xticks(range(len(images)), list(LABELS.values()))
     axis.set(ylabel="MAPE of one image, ± its spread", ylim=(0, None), xlim=(-0.4, 2.7), title="Errors at equal rays")

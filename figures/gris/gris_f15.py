@@ -87,28 +87,28 @@ def draw(a: Arrays) -> "Picture":
     picture, axes = style.panels(1, 2, width=5.0, height=3.6)
     left, right = axes[0]
     y = np.arange(len(TEN))[::-1]
-    left.axvspan(LOW, HIGH, color="#dddddd", zorder=0, label="printed range")
-    left.axvline(LEAST, color="k", ls=":", marker="", lw=1, label="least")
-    left.barh(y + 0.2, reductions(a, "rays"), 0.38, color="#0072B2", label="equal rays")
+    left.axvspan(LOW, HIGH, color=style.PALE, zorder=0, label="printed range")
+    left.axvline(LEAST, color=style.INK, ls=":", marker="", lw=1, label="least")
+    left.barh(y + 0.2, reductions(a, "rays"), 0.38, color=style.BLUE, label="equal rays")
     left.barh(
-        y - 0.2, reductions(a, "time"), 0.38, color="#ffffff", edgecolor="#0072B2", hatch="//", label="equal time"
+        y - 0.2, reductions(a, "time"), 0.38, color=style.PAPER, edgecolor=style.BLUE, hatch="//", label="equal time"
     )
     left.set_yticks(y, TEN)
     left.grid(visible=False, axis="y")
     left.set_xlim(min(0, reductions(a, "time").min() - 0.02), 1)
     left.set(xlabel="reduction of MAPE", title="ReSTIR PT against path tracing")
-    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4)
-    for name, label, dy, look in (
-        ("rays", "path tracing, equal rays", 0.1, {"color": "#E69F00", "marker": "s"}),
-        ("restir", "ReSTIR PT", -0.1, {"color": "#0072B2", "marker": "o"}),
+    style.below(left, ncols=4)
+    for name, dy, look in (
+        ("rays", 0.1, style.look("path tracing", ls="", label="path tracing, equal rays")),
+        ("restir", -0.1, style.look("ReSTIR PT", ls="")),
     ):
         e = a[name]
         spread = 1.96 * e.std(axis=1, ddof=1) / np.sqrt(e.shape[1])
-        right.errorbar(e.mean(axis=1), y + dy, xerr=spread, ls="", label=label, markevery=1, **look)
+        right.errorbar(e.mean(axis=1), y + dy, xerr=spread, markevery=1, **look)
     right.set_xscale("log")
     right.set_yticks(y, [f"{a['rays_ours'][k]:.0f} / {a['rays_tree'][k]:.1f}" for k in range(len(TEN))])
     right.set(xlabel="MAPE of the whole image (bars: 95%)", ylabel="rays: our frame / a tree", title="Errors")
-    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+    style.below(right, ncols=2)
     return picture
 
 

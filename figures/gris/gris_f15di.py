@@ -180,13 +180,9 @@ def draw(a: Arrays) -> "Picture":
 def draw_images(axis: "Axes", a: Arrays) -> None:
     """The first run: without ReSTIR DI, with it, and the truth, of both parts."""
     rows = [row for images, truth in zip(a["images"], a["reference"], strict=True) for row in (*images[:, 0], truth)]
-    place = (0, len(rows[0]), len(rows), 0)
-    shown = axis.imshow(rows, vmin=0, vmax=2 * a["reference"].max(), aspect="auto", extent=place)
-    axis.figure.colorbar(shown, ax=axis, label="radiance", extend="max")
     labels = [f"{part}, {how}" for part in ("direct", "whole") for how in (*HOW, "reference")]
-    axis.set_yticks(np.arange(len(rows)) + 0.5, labels)
-    axis.axhline(3, color="w", lw=3)
-    axis.grid(visible=False)
+    style.strips(axis, rows, labels, 2 * a["reference"].max(), len(rows[0]))
+    axis.plot([0, len(rows[0])], [3, 3], color=style.PAPER, ls="-", marker="", lw=3)
     axis.set(xlabel="pixel", title="One frame")
 
 
@@ -194,8 +190,7 @@ def draw_errors(axis: "Axes", error: Array) -> None:
     """MAPE of both parts."""
     for how, name in enumerate(HOW):
         place = np.arange(2) + 0.36 * (how - 0.5)
-        hatch = ("", "//")[how]
-        bars = axis.bar(place, error[:, how].mean(axis=1), 0.34, label=name, hatch=hatch, color=style.COLOURS[3 * how])
+        bars = axis.bar(place, error[:, how].mean(axis=1), 0.34, **style.bar(name))
         axis.bar_label(bars, fmt="%.2f")
     axis.set_xticks([0, 1], PARTS)
     axis.set(ylabel="MAPE", title="Error of a frame", ylim=(0, 1.3 * error.mean(axis=2).max()))
@@ -205,15 +200,16 @@ def draw_errors(axis: "Axes", error: Array) -> None:
 def draw_means(axis: "Axes", a: Arrays) -> None:
     """Mean direct light of all runs, 1/Z with visibility and 1/M, over the truth."""
     truth = a["reference"][0]
-    for k, (images, name) in enumerate(((a["images"][0, 1], "1/Z with visibility"), (a["biased"], "1/M"))):
+    for images, name, label in ((a["images"][0, 1], "1/Z", "1/Z with visibility"), (a["biased"], "1/M", "1/M")):
+        look = style.look(name, marker="", label=label)
         mean, error = images.mean(axis=0) / truth, images.std(axis=0, ddof=1) / np.sqrt(len(images)) / truth
-        axis.fill_between(
-            np.arange(len(truth)), mean - 2 * error, mean + 2 * error, color=style.COLOURS[3 * k], alpha=0.3
-        )
-        axis.plot(mean, color=style.COLOURS[3 * k], ls=style.LINES[k], marker="", label=name)
-    axis.axhline(1, color="k", lw=0.8)
+        axis.fill_between(np.arange(len(truth)), mean - 2 * error, mean + 2 * error, color=look["color"], alpha=0.3)
+        axis.plot(mean, **look)
+    axis.axhline(1, **style.look("truth"))
     edges = np.flatnonzero(a["edges"])
-    axis.plot(edges, np.full(len(edges), 0.5), color="k", marker="|", ls="", markevery=1, label="edges of shadows")
+    axis.plot(
+        edges, np.full(len(edges), 0.5), color=style.INK, marker="|", ls="", markevery=1, label="edges of shadows"
+    )
     axis.set(
         xlabel="pixel", ylabel="mean / truth, ± 2 standard errors", title="Direct light by ReSTIR DI", ylim=(0.4, 1.45)
     )

@@ -252,23 +252,23 @@ CORNER = (
 
 def draw(a: Arrays) -> "Picture":
     """MAPE over rays in six scenes, speedups, and the shifts' ratio where they differ."""
-    picture, axes = style.panels(2, 4, width=3.2, height=2.7)
+    picture, axes = style.panels(2, 4, width=3.0, height=2.9)
     for axis, scene in zip([*axes[0], *axes[1, :2]], SIX, strict=True):
         for method in METHODS:
-            axis.loglog(*curve(a, scene, method), label=method)
+            axis.loglog(*curve(a, scene, method), **style.look(method))
         same_time = offline.equal_time(1) * float(a[f"{scene}.path tracing.rays"]) / offline.UNIT
-        axis.axvline(same_time, color="#777777", lw=0.9, label="path tracing in the time of a frame")
+        axis.axvline(same_time, color=style.GREY, lw=1, ls=":", marker="", label=SAME_TIME)
         axis.set(xlabel="rays per pixel", ylabel="MAPE", title=scene.replace("_", " "))
-    axes[0, 0].legend(fontsize=5.5, loc="lower left")
+    picture.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     times = axes[1, 2]
     for k, method in enumerate(METHODS[1:]):
-        times.bar(np.arange(len(SIX)) + 0.27 * (k - 1), list(speedups(a, method).values()), 0.25, label=method)
-    times.axhline(1, color="k", lw=0.8)
+        times.bar(np.arange(len(SIX)) + 0.27 * (k - 1), list(speedups(a, method).values()), 0.25, **style.bar(method))
+    times.axhline(1, color=style.INK, lw=1, ls=":", label="as path tracing")
     times.set_yscale("log")
-    times.set_xticks(range(len(SIX)), [name.replace("_", "\n") for name in SIX], fontsize=6)
+    times.set_xticks(range(len(SIX)), [name.replace("_", "\n") for name in SIX], rotation=90)
     times.set(ylabel="rays of path tracing / rays", title=f"To the MAPE of {TARGET} trees")
-    times.set_ylim(top=200)
-    times.legend(ncols=3, fontsize=6, loc="upper left")
+    times.set_ylim(top=2000)
+    times.legend(ncols=2, loc="upper left", columnspacing=1, handlelength=1.5)
     draw_ratios(a, axes[1, 3])
     return picture
 
@@ -279,16 +279,19 @@ def draw_ratios(a: Arrays, axis: "Axes") -> None:
     for k, scene in enumerate(scenes):
         hybrid, other = shift_errors(a, scene)
         low, high, _ = criteria.ratio_interval(hybrid, other)
-        axis.plot([low, high], [k, k], color=style.COLOURS[0], ls="-", marker="|")
-        axis.plot(hybrid.mean() / other.mean(), k, color=style.COLOURS[0], marker="o")
-    axis.axvline(1, color="k", lw=0.8)
+        axis.plot([low, high], [k, k], color=style.INK, ls="-", marker="|", markevery=1)
+        axis.plot(hybrid.mean() / other.mean(), k, color=style.INK, marker="o", markevery=1)
+    axis.axvline(1, color=style.INK, lw=1, ls=":", marker="", label="shifts alike")
+    axis.set_ylim(-0.5, len(scenes) + 0.5)
+    axis.legend(loc="upper left")
     axis.set_xscale("log")
     axis.set_xticks([], minor=True)
     axis.set_xticks([0.2, 0.5, 1, 2], ["0.2", "0.5", "1", "2"])
-    axis.set_yticks(range(len(scenes)), [scene.replace("_", " ") for scene in scenes])
+    axis.set_yticks(range(len(scenes)), [scene.replace("_", "\n") for scene in scenes])
     axis.set(xlabel="relMSE, hybrid / reconnection", title="Equal samples, 95%")
-    axis.tick_params(axis="y", labelsize=6)
 
+
+SAME_TIME = "path tracing in the time of a frame"
 
 FIGURE = Figure(
     id="GRIS-F17",

@@ -116,7 +116,7 @@ def draw(a: Arrays) -> "Picture":
     picture, axes = style.panels(2, 2, width=4.2, height=2.9)
     for k, (axis, name) in enumerate(zip(axes.ravel(), FLOORS, strict=True)):
         for method in METHODS[:2]:
-            axis.loglog(*curve(a, k, method), label=method)
+            axis.loglog(*curve(a, k, method), **style.look(method), markevery=1)
         axis.set(xlabel="rays per pixel", ylabel="MAPE", title=f"{name}: {speedup(a, k):.2g}x")
         axis.legend()
     return picture

@@ -179,22 +179,24 @@ def draw(a: Arrays) -> "Picture":
     variance, weight = axes[0]
     t, excess, wrong = a["points"]
     look = {"ls": "", "ms": 3, "markevery": 1, "rasterized": True}
-    variance.loglog(t, wrong, **look, marker="x", color="#bbbbbb", label="control: $W_Y$ without $m_i$", zorder=1)
+    variance.loglog(t, wrong, **look, marker="x", color=style.GREY, label="control: $W_Y$ without $m_i$", zorder=1)
     for kind, name in enumerate(KINDS):
         mine = a["kind"] == kind
-        variance.loglog(t[mine], excess[mine], **look, label=name)
+        variance.loglog(t[mine], excess[mine], **style.nth(kind, label=name) | look)
     draw_bounds(variance, t)
     for name, values in zip(WEIGHTS, a["weights"], strict=True):
         if name != "1/Z":
-            weight.plot(np.sort(values), np.linspace(0, 1, len(values)), marker="", label=LABELS[name])
-    weight.axvline(1, color="k", lw=0.8)
+            weight.plot(
+                np.sort(values), np.linspace(0, 1, len(values)), **style.look(name, marker="", label=LABELS[name])
+            )
+    weight.axvline(1, color=style.INK, lw=1, ls=(0, (1, 1)), marker="", label="at the bound")
     weight.set(
         xscale="log",
         xlabel="largest $w_i$ over its bound $c_i C_i / C_R$",
         ylabel="fraction of configurations",
         title="Theorem A.4: only 1/M exceeds 1",
     )
-    weight.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
+    style.below(weight)
     return picture
 
 
@@ -205,8 +207,10 @@ def draw_bounds(axes: Any, t: Array) -> None:
         (bounds.PRINTED, "-", r"$t\,(1 + 2t)$, printed"),
         (bounds.SHARPER, "--", r"$t\,(1 + t)$"),
     ):
-        axes.loglog(x, bounds.excess_bound(1, x**2, 1, constant), ls=ls, color="k", marker="", label=label)
-    axes.loglog(x, bounds.sharpest_excess_bound(1, x**2, 1), ":k", marker="", label="$t\\sqrt{1 + t^2}$")
+        axes.loglog(x, bounds.excess_bound(1, x**2, 1, constant), ls=ls, color=style.INK, marker="", label=label)
+    axes.loglog(
+        x, bounds.sharpest_excess_bound(1, x**2, 1), ls=":", color=style.INK, marker="", label="$t\\sqrt{1 + t^2}$"
+    )
     axes.set(
         xlim=(0.008, 1.3 * t.max()),
         ylim=(1e-5, 1e4),
@@ -214,7 +218,7 @@ def draw_bounds(axes: Any, t: Array) -> None:
         ylabel=r"excess of Var$[f(Y) W_Y]$ in $(C_f \|\hat p\|)^2$",
         title="Theorem 1: exact points lie below (negative ones not drawn)",
     )
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, fontsize=7)
+    style.below(axes)
 
 
 FIGURE = Figure(

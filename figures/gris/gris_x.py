@@ -223,7 +223,7 @@ def draw(a: Arrays) -> "Picture":
     )
     _table(
         still,
-        "GRIS-F17x, GRIS-C20, indirect light: path tracing / offline frame; rays to equal MAPE, errors at equal rays",
+        "GRIS-F17x, GRIS-C20: path tracing / offline frame; rays to equal MAPE, errors at equal rays",
         [*(f"rays,\n{shift}" for shift in SHIFTS), "MAPE,\nhybrid", "relMSE,\nhybrid"],
         gris_f17.SIX,
         np.hstack([a["speedups"], a["ratios"]]),
@@ -248,7 +248,7 @@ def _table(axis: "Axes", title: str, heads: Sequence[str], names: Sequence[str],
     table.set_fontsize(8)
     for (row, _), cell in table.get_celld().items():
         cell.set_height((2 if row == 0 else 1) / (len(cells) + 2))
-        cell.set_edgecolor("#bbbbbb")
+        cell.set_edgecolor(style.GREY)
 
 
 FIGURE = Figure(

@@ -202,10 +202,7 @@ def shown(bias: Array) -> Array:
     return np.asarray(np.maximum(abs(bias), 1e-16))
 
 
-LOOKS: Mapping[str, dict[str, Any]] = {
-    name: {"color": style.COLOURS[k], "ls": style.LINES[k], "marker": style.MARKERS[k], "label": name}
-    for k, name in enumerate(name for name in WALKS if name != "right, wrapped")
-}
+LOOKS: Mapping[str, dict[str, Any]] = {name: style.look(name) for name in WALKS if name != "right, wrapped"}
 FIGURE = Figure(
     id="MCMC-E06",
     title="Mutations that keep W unbiased, and those that do not",

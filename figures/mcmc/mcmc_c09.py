@@ -187,15 +187,15 @@ def draw(a: Arrays) -> "Picture":
     picture, axes = style.panels(1, 3, width=3.7, height=3.2)
     many, ring, caps = axes[0]
     for name, bias in zip(CHAINS, a["bias"][:, 1].mean(axis=-1), strict=True):
-        many.semilogy(range(1, bias.size + 1), np.maximum(abs(bias), 1e-16), label=name)
+        many.semilogy(range(1, bias.size + 1), np.maximum(abs(bias), 1e-16), **style.look(name))
     many.set(xlabel="frame $t$", ylabel="|relative bias| of the image", title="64 pixels, 5 mutations a frame: exact")
     many.set_xticks([1, 5, 10, 15, 20])
     many.legend(loc="center right")
-    for k, exact, error in zip(a["mutations"], a["ring"], a["error"], strict=True):
-        label = f"{k} mutations per frame"
+    for n, (k, exact, error) in enumerate(zip(a["mutations"], a["ring"], a["error"], strict=True)):
+        look = style.nth(3 * n + 2, label=f"{k} mutations per frame", markevery=1)
         spread = 2 * error.std(axis=-1, ddof=1) / np.sqrt(error.shape[-1])
-        ring.plot(a["ring_caps"], exact, markevery=1, label=label)
-        caps.errorbar(a["caps"], error.mean(axis=-1), spread, markevery=1, label=label)
+        ring.plot(a["ring_caps"], exact, **look)
+        caps.errorbar(a["caps"], error.mean(axis=-1), spread, **look)
     for axis, title in ((ring, "Ring of 8 pixels: exact"), (caps, "64 pixels: the real passes")):
         axis.set(xlabel="cap $M_c$ (samples)", ylabel="relMSE of a frame", title=title)
         axis.set(xscale="log", yscale="log")

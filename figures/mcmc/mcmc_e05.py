@@ -208,21 +208,23 @@ def draw(a: Arrays) -> "Picture":
     picture, axes = style.panels(2, len(NAMES), width=3.0, height=2.5)
     for k, name in enumerate(NAMES):
         turn = np.degrees(a["turns"][k, :, 1])
-        for how, rates in zip(HOW, a["rates"][k].mean(axis=-1).T, strict=True):
-            axes[0, k].semilogx(turn, rates, label=how)
+        for number, (how, rates) in enumerate(zip(HOW, a["rates"][k].mean(axis=-1).T, strict=True)):
+            axes[0, k].semilogx(turn, rates, **style.nth(number, label=how), markevery=1)
         axes[0, k].set(title=name.replace("_", " "), ylim=(0, 1.02), xlim=LIMITS)
         for number, how in enumerate(HOW[1:], start=1):
             found = [criteria.ratio_interval(rates[0], rates[number])[:2] for rates in a["rates"][k]]
             middle = a["rates"][k, :, 0].mean(axis=-1) / a["rates"][k, :, number].mean(axis=-1)
             low, high = np.array(found).T
-            colour, marker = style.COLOURS[number], style.MARKERS[number]
-            axes[1, k].errorbar(turn, middle, [middle - low, high - middle], color=colour, marker=marker, label=how)
-        axes[1, k].axhline(1, color="k", lw=0.8)
-        axes[1, k].set(xscale="log", xlim=LIMITS, xlabel="median turn by numbers / degrees")
+            look = style.nth(number, label=how, markevery=1)
+            axes[1, k].errorbar(turn, middle, [middle - low, high - middle], **look)
+        axes[1, k].axhline(1, color=style.INK, lw=1, ls=":", marker="", label="alike")
+        axes[1, k].set(xscale="log", xlim=LIMITS, xlabel="median turn by numbers (degrees)")
     axes[0, 0].set_ylabel("acceptance rate")
     axes[1, 0].set_ylabel("acceptance, numbers / angles")
-    axes[0, 0].legend(title="Gaussian steps of", loc="lower left")
-    axes[1, 0].legend(title="compared with")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    guide = axes[1, 0].get_legend_handles_labels()
+    handles, labels = [*handles, guide[0][guide[1].index("alike")]], [*labels, "alike"]
+    picture.legend(handles, labels, title="Gaussian steps of", loc="outside lower center", ncols=4)
     return picture
 
 

@@ -1,29 +1,40 @@
 """One look for all figures: readable without colour, drawn without pyplot, the same on every machine.
 
-Matplotlib is imported when something is drawn: workers and listings do without.
+A method, a MIS weight or a cap has one colour, marker and dash wherever it appears (`LOOKS`).  Matplotlib is imported
+when something is drawn: workers and listings do without.
 """
 # ruff: noqa: PLC0415
 
-import io
-import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from cycler import cycler
 from numpy.typing import NDArray
 
-from figures.claims.figure import Arrays, Claim, Figure, conditions_of, verdict_line
-
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Picture
+    from matplotlib.image import AxesImage
 
 # Okabe and Ito's colour-blind safe palette, ordered so that neighbours also differ in lightness.
-COLOURS = ("#0072B2", "#E69F00", "#000000", "#D55E00", "#56B4E9", "#009E73", "#CC79A7")
+BLUE, ORANGE, INK, VERMILLION, SKY, GREEN, PURPLE = (
+    "#0072B2", "#E69F00", "#000000", "#D55E00", "#56B4E9", "#009E73", "#CC79A7",
+)  # fmt: skip
+COLOURS = (BLUE, ORANGE, INK, VERMILLION, SKY, GREEN, PURPLE)
+GREY, PALE, PAPER = "#888888", "#dddddd", "#ffffff"
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (3, 1)), (0, (7, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-CYCLE = cycler(color=COLOURS, linestyle=LINES, marker=MARKERS, markevery=[0.08] * len(COLOURS))
+HATCHES = ("", "//", "..", "xx", "\\\\", "++", "oo")
+LABELLED = 38.0
+"""Height of ticks and label under an axis, in points."""
+SPARSE = 0.08
+"""Distance between markers of a line, in diagonals of its axes."""
+
+CYCLE = cycler(color=COLOURS, linestyle=LINES, marker=MARKERS, markevery=[SPARSE] * len(COLOURS))
 IMAGE_MAP = "cividis"  # perceptually uniform, colour-blind safe, monotone in grey
 
 RC: dict[str, Any] = {
@@ -35,29 +46,19 @@ RC: dict[str, Any] = {
     "axes.titlesize": 10.0,
     "axes.titlelocation": "left",
     "font.size": 9.0,
-    "grid.color": "#dddddd",
+    "grid.color": PALE,
     "grid.linewidth": 0.6,
+    "hatch.linewidth": 0.8,
     "image.cmap": IMAGE_MAP,
     "image.interpolation": "nearest",
     "legend.frameon": False,
-    "legend.fontsize": 8.0,
+    "legend.fontsize": 8.5,
+    "legend.handlelength": 2.8,
     "lines.linewidth": 1.5,
     "lines.markersize": 4.5,
     "figure.constrained_layout.use": True,
     "savefig.dpi": 150.0,
 }
-
-FOOT: dict[str, Any] = {
-    "fontsize": 7.5,
-    "family": "DejaVu Sans",
-    "va": "top",
-    "ha": "left",
-    "linespacing": 1.3,
-    "parse_math": False,
-}
-LINE_INCHES = 0.138
-
-METADATA: dict[str, dict[str, Any]] = {"png": {"Software": None}, "pdf": {"CreationDate": None}}
 
 
 @contextmanager
@@ -76,7 +77,7 @@ def panels(
 ) -> tuple["Picture", NDArray[np.object_]]:
     """A picture and its (rows, columns) axes, `width` x `height` inches each.
 
-    `fig, ax = panels(1, 2)`, then `ax[0, 1].loglog(n, variance, label="Talbot")`: `ax` is always a 2D array.
+    `fig, ax = panels(1, 2)`, then `ax[0, 1].loglog(n, variance, **look("talbot"))`: `ax` is always a 2D array.
     """
     from matplotlib.figure import Figure as Picture
 
@@ -84,39 +85,128 @@ def panels(
     return picture, picture.subplots(rows, columns, squeeze=False)
 
 
-def drawn(figure: Figure, arrays: Arrays, claims: Sequence[Claim]) -> dict[str, bytes]:
-    """A figure's picture as PNG and PDF, by the names of their files, each with the verdicts at its foot."""
-    lines = [verdict_line(claim, conditions_of(figure, claim.id)) for claim in claims]
-    with context():
-        picture = settled(figure.draw(arrays))
-        return {f"figure.{kind}": render(picture, lines, kind) for kind in METADATA}
+# ---------------------------------------------------------------- what a method looks like
 
 
-def settled(picture: "Picture") -> "Picture":
-    """The picture, its layout worked out once for all the files to come."""
-    picture.draw_without_rendering()
-    picture.set_layout_engine("none")
-    return picture
+@dataclass(frozen=True)
+class Look:
+    """Colour, marker, dash and hatch: any one but the colour tells it from its neighbours."""
+
+    colour: str
+    marker: str
+    line: Any
+    hatch: str
 
 
-def render(picture: "Picture", lines: Sequence[str], kind: str) -> bytes:
-    """The picture as a file with `lines` at its foot, which hangs below so that no layout is disturbed.
-
-    The same picture gives the same bytes: whatever depends on the time is left out.
-    """
-    from matplotlib.transforms import Bbox
-
-    width, height = picture.get_size_inches()
-    text = "\n".join(wrapped(lines, width))
-    depth = LINE_INCHES * (text.count("\n") + 1) + 0.1
-    foot = picture.text(0.08 / width, -0.03 / height, text, **FOOT)
-    page, file = Bbox.from_bounds(0, -depth, width, height + depth), io.BytesIO()
-    picture.savefig(file, format=kind, bbox_inches=page, metadata=METADATA[kind])
-    foot.remove()
-    return file.getvalue()
+def _cycled(k: int) -> Look:
+    return Look(COLOURS[k], MARKERS[k], LINES[k], HATCHES[k])
 
 
-def wrapped(lines: Sequence[str], width: float) -> list[str]:
-    """The lines of a foot, broken to `width` inches."""
-    columns = max(30, int(width * 16.5))
-    return [piece for line in lines for piece in textwrap.wrap(line, columns, subsequent_indent="    ")]
+TALBOT, PAIRWISE, DEFENSIVE, UNCAPPED = _cycled(0), _cycled(1), _cycled(2), Look(VERMILLION, "*", ":", "xx")
+CONTRIBUTION, CONSTANT = Look(VERMILLION, "D", ":", "xx"), Look(SKY, "v", LINES[4], "\\\\")
+HYBRID = Look(BLUE, "o", "-", "")
+
+LOOKS: Mapping[str, Look] = MappingProxyType(
+    {
+        # renderers and their shifts
+        "hybrid": HYBRID,
+        "ReSTIR PT": HYBRID,
+        "reconnection": Look(VERMILLION, "D", "--", "xx"),
+        "no distance test": Look(INK, "X", ":", "oo"),
+        "path tracing": Look(ORANGE, "s", "-.", "//"),
+        "path reuse": Look(GREEN, "v", LINES[5], "++"),
+        "ReSTIR GI": Look(SKY, "^", LINES[4], ".."),
+        "ReSTIR DI": Look(PURPLE, "P", LINES[6], "\\\\"),
+        "reference": Look(INK, "", (0, (1, 1)), ""),
+        "truth": Look(INK, "", (0, (1, 1)), ""),
+        # MIS weights
+        "talbot": TALBOT,
+        "Talbot": TALBOT,
+        "generalised Talbot": TALBOT,
+        "pairwise": PAIRWISE,
+        "defensive": DEFENSIVE,
+        "pairwise, defensive": DEFENSIVE,
+        "1/Z": CONTRIBUTION,
+        "1/M": CONSTANT,
+        "constant": CONSTANT,
+        # caps of the confidence
+        "$M_c = 0$": Look(INK, "o", "-", ""),
+        "$M_c = 1$": Look(SKY, "v", "--", ""),
+        "$M_c = 5$": Look(GREEN, "^", "-.", ""),
+        "$M_c = 20$": Look(BLUE, "s", LINES[5], ""),
+        "$M_c = 50$": Look(PURPLE, "D", LINES[4], ""),
+        "$M_c = 200$": Look(ORANGE, "P", LINES[6], ""),
+        "$M_c = 1000$": Look(VERMILLION, "X", "-", ""),
+        "no cap": UNCAPPED,
+        # pixels of a pair, and their difference
+        "$f_1$": Look(GREEN, "v", "-", ""),
+        "$f_2$": Look(PURPLE, "P", "--", ""),
+        "after": Look(ORANGE, "s", "--", "//"),
+        "with": Look(BLUE, "o", "-", ""),
+        "positivized": Look(INK, "^", "-.", ".."),
+        # mutations
+        "right": Look(BLUE, "o", "-", ""),
+        "W inverted": Look(ORANGE, "s", "--", ""),
+        "last accepted": Look(INK, "^", "-.", ""),
+        "clamped": Look(VERMILLION, "D", ":", ""),
+        "$w_{bn}$ = 0.25": Look(SKY, "v", LINES[4], ""),
+        "$w_{bn}$ = 0.5": Look(GREEN, "P", LINES[5], ""),
+        "$w_{bn}$ = 1": Look(PURPLE, "X", LINES[6], ""),
+    }
+)
+"""What the project's pictures compare, by name: one look each, in every picture."""
+
+
+def look(name: str, **changes: Any) -> dict[str, Any]:
+    """A line of what is called `name`, which is its label too: `axis.plot(x, y, **look("hybrid"))`."""
+    mine = _known(name)
+    return {"color": mine.colour, "marker": mine.marker, "ls": mine.line, "label": name, **changes}
+
+
+def bar(name: str, **changes: Any) -> dict[str, Any]:
+    """A bar of what is called `name`."""
+    return {"color": _known(name).colour, "hatch": _known(name).hatch, "edgecolor": PAPER, "label": name, **changes}
+
+
+def _known(name: str) -> Look:
+    if name not in LOOKS:
+        raise KeyError(f"{name!r} has no look: add it to LOOKS in figures/report/style.py, or use `nth(k)`")
+    return LOOKS[name]
+
+
+def nth(k: int, **changes: Any) -> dict[str, Any]:
+    """A line that only its own picture knows, by its number there."""
+    return {"color": COLOURS[k], "marker": MARKERS[k], "ls": LINES[k], **changes}
+
+
+def cap(M_c: float) -> str:
+    """The name of a cap."""
+    return f"$M_c = {M_c:g}$" if M_c < np.inf else "no cap"
+
+
+def named(label: str) -> str:
+    """The longest name of a look with which a label begins, such as "path tracing" of "path tracing, equal rays"."""
+    ends = (",", ":", " (", " with ", "")
+    fitting = [name for name in LOOKS if any(label.startswith(name + end) if end else label == name for end in ends)]
+    return max(fitting, key=len, default="")
+
+
+# ---------------------------------------------------------------- strips and legends
+
+
+def strips(axis: "Axes", rows: Sequence[Any], names: Sequence[str], high: float, pixels: float, **bar: Any) -> None:
+    """Rows of pixels above one another, each with its name, and the scale of their radiance from 0 to `high`."""
+    place = (0.0, pixels, float(len(rows)), 0.0)
+    shown: AxesImage = axis.imshow(np.stack(rows), vmin=0, vmax=high, aspect="auto", extent=place)
+    axis.figure.colorbar(shown, ax=axis, **{"label": "radiance", "extend": "max", "pad": 0.02, **bar})
+    axis.set_yticks(np.arange(len(rows)) + 0.5, list(names))
+    axis.grid(visible=False)
+
+
+def below(axis: "Axes", **changes: Any) -> None:
+    """A legend under the axis and its label, where it hides nothing."""
+    from matplotlib.transforms import ScaledTranslation
+
+    under = axis.transAxes + ScaledTranslation(0, -LABELLED / 72, axis.get_figure(root=True).dpi_scale_trans)  # type: ignore[union-attr]
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": under}
+    axis.legend(**{**place, "ncols": 2, "columnspacing": 1.0, "borderaxespad": 0.0, **changes})

@@ -72,14 +72,14 @@ def draw_scene(panels: Sequence["Axes"] | Array, scene: str, a: Arrays) -> None:
     setting, (left, right) = SCENES[scene](), panels
     bundle_picture(left, setting, whole_film(scene), a["u"], a["pixel"])
     fluence_picture(right, setting, a["fluence"])
-    left.set_title(sentence(scene), fontsize=7.5)
-    right.set_title(f"fluence of {scene}", fontsize=7.5)
+    left.set_title(sentence(scene), fontsize=8.5)
+    right.set_title(f"fluence of {scene}", fontsize=8.5)
 
 
 def sentence(scene: str) -> str:
     """What the scene is for, the first sentence of its docstring, in short lines."""
     words = " ".join((SCENES[scene].__doc__ or "").partition("\n\n")[0].split())
-    return "\n".join(textwrap.wrap(f"{scene}, {words}", 46))
+    return "\n".join(textwrap.wrap(f"{scene}, {words}", 42))
 
 
 FIGURE = Figure(
@@ -89,7 +89,7 @@ FIGURE = Figure(
     source="scenes and sensor of this project, after [GRIS 9]",
     claims=(),
     presets={
-        "quick": {"rows": 40, "samples": 40, "paths": 48},
+        "quick": {"rows": 80, "samples": 24, "paths": 96},
         "paper": {"rows": 160, "samples": 1024, "paths": 96},
     },
     chunks=chunks,

@@ -233,10 +233,10 @@ def draw(a: Arrays) -> "Picture":
     table.get_gridspec().set_width_ratios((2, 1))
     ranges.sharey(table)
     draw_matrix(table, a["value"], a["caught"])
-    draw_ranges(ranges, a["bias"], a["ranges"])
     for axes in (table, ranges):
-        axes.axhline(len(BUGS) - 0.5, color="k", lw=1)
+        axes.axhline(len(BUGS) - 0.5, color=style.INK, lw=1, ls="-", marker="", label="above: bias; below: none")
         axes.tick_params(length=0)
+    draw_ranges(ranges, a["bias"], a["ranges"])
     table.set_ylim(len(BOTH) - 0.5, -0.5)
     return picture
 
@@ -244,13 +244,15 @@ def draw(a: Arrays) -> "Picture":
 def draw_matrix(axes: "Axes", value: Array, caught: Array) -> None:
     """Numbers in % where a check speaks, on ground that is darker than grey for too little, brighter for too much."""
     shown = np.where(caught, np.clip(value, -1, 1), np.nan)
-    axes.imshow(shown, cmap=style.IMAGE_MAP, vmin=-1, vmax=1, aspect="auto")
+    image = axes.imshow(shown, cmap=style.IMAGE_MAP, vmin=-1, vmax=1, aspect="auto")
+    scale: dict[str, Any] = {"location": "bottom", "shrink": 0.5, "aspect": 50, "pad": 0.01, "extend": "both"}
+    axes.figure.colorbar(image, ax=axes, label="what a check finds, 1 = 100 %", **scale)
     for (row, column), number in np.ndenumerate(value):
         silent = not caught[row, column]
-        colour = "#999999" if silent else "k" if number > 0.1 else "w"
+        colour = style.GREY if silent else "k" if number > 0.1 else "w"
         text = "·" if silent else percent(number)
-        axes.text(column, row, text, ha="center", va="center", color=colour, fontsize=7)
-    axes.set_yticks(range(len(BOTH)), list(BOTH), fontsize=7.5)
+        axes.text(column, row, text, ha="center", va="center", color=colour, fontsize=8.5)
+    axes.set_yticks(range(len(BOTH)), list(BOTH), fontsize=8.5)
     axes.set_xticks(range(len(CHECKS)), [name.replace("p_hat", r"$\hat p$") for name in CHECKS], rotation=35, ha="left")
     axes.tick_params(axis="x", top=True, labeltop=True, bottom=False, labelbottom=False)
     axes.set_xlabel(
@@ -269,17 +271,17 @@ def draw_ranges(axes: "Axes", bias: Array, ranges: Array) -> None:
     """Bars: cells of the mistake's own scene; lines: cells of all random scenes, with a triangle where they go on."""
     row = np.arange(len(BOTH))
     low, high = np.minimum(ranges[..., 0].min(axis=0), 0), np.maximum(ranges[..., 1].max(axis=0), 0)
-    axes.barh(row, bias[:, 1] - bias[:, 0], left=bias[:, 0], color="#0072B2", height=0.6, label="its own scene")
-    axes.hlines(row, np.maximum(low, LEFT), np.minimum(high, RIGHT), color="k", lw=1, label="random scenes")
+    axes.barh(row, bias[:, 1] - bias[:, 0], left=bias[:, 0], color=style.BLUE, height=0.6, label="its own scene")
+    axes.hlines(row, np.maximum(low, LEFT), np.minimum(high, RIGHT), color=style.INK, lw=1, label="random scenes")
     beyond = high > RIGHT
     axes.plot(np.full(beyond.sum(), RIGHT), row[beyond], ls="", marker=">", color="k", markevery=1, clip_on=False)
     shows = (np.abs(ranges).max(axis=-1) > 1e-9).sum(axis=0)
     for y, count in zip(row, shows, strict=True):
-        axes.text(RIGHT + 0.12, float(y), f"{count} / {len(ranges)}", va="center", fontsize=7)
-    axes.axvline(0, color="k", lw=0.8)
+        axes.text(RIGHT + 0.12, float(y), f"{count} / {len(ranges)}", va="center", fontsize=8.5)
+    axes.axvline(0, color=style.INK, lw=0.8, ls=":", marker="", label="no bias")
     axes.set(xlim=(LEFT, RIGHT), xlabel="relative bias of cells (1 = 100 %)")
     axes.set_title("Range of the exact bias\nright: random scenes in which it shows")
-    axes.legend(loc="lower right", bbox_to_anchor=(1, 0.005))
+    style.below(axes, ncols=1)
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", labelleft=False)
 

@@ -13,7 +13,7 @@ from figures.engine.jobs import stream
 from figures.experiments.exact import Loop
 from figures.gris import gris_c06, gris_f09, gris_f10
 from figures.project import Project
-from figures.report import style
+from figures.report import legible, press, style
 from tests.core.stubs import live
 from toy1d import quotient, two_pixels
 
@@ -79,15 +79,13 @@ def test_the_claims_hold_and_spoilt_numbers_do_not_pass(name, changes, array, sp
     arrays = made(figure, {**figure.presets["quick"], **changes})
     assert differing(figure, arrays) == {}
     assert "not reproduced" in verdicts(figure, spoilt(arrays, array, spoil))
-    assert unlabelled(figure, arrays) == []
+    assert unreadable(figure, arrays) == []
 
 
-def unlabelled(figure: Figure, arrays: Arrays) -> list[str]:
-    """Titles of the panels that lack a label on an axis that they show."""
+def unreadable(figure: Figure, arrays: Arrays) -> list[str]:
+    """What in the picture cannot be read."""
     with style.context():
-        panels = figure.draw(arrays).axes
-    shown = [panel for panel in panels if panel.axison]
-    return [panel.get_title("left") for panel in shown if not (panel.get_xlabel() and panel.get_ylabel())]
+        return legible.troubles(press.settled(figure.draw(arrays)))
 
 
 # ---------------------------------------------------------------- chains, too long to run here
@@ -128,10 +126,10 @@ def test_frames_of_spatial_reuse_correlate_less_than_that_bound():
 
 def test_short_chains_make_whole_pictures():
     size = {"frames": 40, "replicas": 8}
-    assert unlabelled(gris_f10.FIGURE, made(gris_f10.FIGURE, size)) == []
+    assert unreadable(gris_f10.FIGURE, made(gris_f10.FIGURE, size)) == []
     short = {"frames": 120, "chains": 50, "long": 20, "replicas": 4, "blocks": 1}
-    assert unlabelled(gris_c06.FIGURE, made(gris_c06.FIGURE, short)) == []
-    assert unlabelled(gris_f09.FIGURE, synthetic()) == []
+    assert unreadable(gris_c06.FIGURE, made(gris_c06.FIGURE, short)) == []
+    assert unreadable(gris_f09.FIGURE, synthetic()) == []
 
 
 def synthetic() -> Arrays:
