@@ -191,7 +191,7 @@ def test_a_full_disk_is_told_and_the_run_goes_on_later(tmp_path, capsys, monkeyp
     here, out = project(tmp_path, "sound"), tmp_path / "out"
     assert figures(here, "run", "--out", tmp_path / "whole") == 0
     with monkeypatch.context() as patch:
-        patch.setattr(os, "fsync", Full(room=3))
+        patch.setattr(os, "fsync", Full(room=5))
         assert figures(here, "run", "--out", out) == 2
     assert "No space left on device" in capsys.readouterr().err
     stored = arrays(out)
