@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -149,17 +149,20 @@ def _run(options: argparse.Namespace, project: Project) -> int:
     entries, rows = registry.load(project.modules), ledger.load(project.ledger)
     chosen = tuple(registry.select(entries, options.ids))
     _refuse(list(ledger.unknown(rows, chosen)))
-    progress, press = Progress(options.progress), _press(rows, entries, project.paper)
+    progress, hooks = Progress(options.progress), session.Press(press.drawn, _report_of(project, rows, entries))
     with _crew(options, chosen, progress) as crew:
-        request = session.Request(chosen, options.preset, options.seed, crew, press, options.out)
+        request = session.Request(chosen, options.preset, options.seed, crew, hooks, options.out)
         status, judged = run.run(request, rows, entries, project.paper, progress)
     _say(judged, project, options.out)
     return status
 
 
-def _press(rows: Mapping[str, Row], entries: Mapping[str, Entry], paper: Path) -> session.Press:
-    """The style of this project's pictures, and its page."""
-    return session.Press(press.drawn, partial(report.write, ledger=rows, entries=entries, paper=paper))
+def _report_of(
+    project: Project, rows: Mapping[str, Row], entries: Mapping[str, Entry]
+) -> Callable[[Path], list[Judged]]:
+    """What writes this project's page into a folder of results."""
+    found = showings.showings(project.tests, project.benchmarks, rows, entries)
+    return partial(report.write, source=report.Source(rows, entries, found, project.paper))
 
 
 def _crew(options: argparse.Namespace, chosen: Sequence[Entry], progress: Progress) -> AbstractContextManager[Crew]:
@@ -169,7 +172,8 @@ def _crew(options: argparse.Namespace, chosen: Sequence[Entry], progress: Progre
 
 
 def _report(options: argparse.Namespace, project: Project) -> int:
-    judged = report.write(options.out, ledger.load(project.ledger), registry.load(project.modules), project.paper)
+    rows, entries = ledger.load(project.ledger), registry.load(project.modules)
+    judged = _report_of(project, rows, entries)(options.out)
     _say(judged, project, options.out)
     return 0
 

@@ -10,6 +10,15 @@ from tests.figures.project import figures, project
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+NUMBER = re.compile(r"[-+]?\d+\.\d+")
+
+
+def rounded(text: str) -> list[str]:
+    """The words of a printout, its numbers to three digits: the last ones are the machine's."""
+    return NUMBER.sub(lambda number: f"{float(number[0]):.3g}", text).split()
+
+
+SHOWN = [rounded(block) for block in re.findall(r"```text\n(.*?)```", README, re.DOTALL)]
 LINES = [line.partition("  #")[0].strip() for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
          for line in block.splitlines()]  # fmt: skip
 
@@ -20,6 +29,21 @@ def test_the_readme_examples_run_and_find_the_planted_bug(capsys) -> None:
     assert len(re.findall(r"\d\.\d+", printed.splitlines()[0])) > 3
     assert "1/M over unequal supports" in printed
     assert "BIASED: -50.00%" in printed
+
+
+def test_each_example_runs_by_itself_and_prints_what_the_readme_shows(capsys) -> None:
+    assert len(SHOWN) == len(EXAMPLES)
+    assert [printed(block, capsys) for block in EXAMPLES] == SHOWN
+
+
+def test_another_printout_than_the_one_shown_is_noticed(capsys) -> None:
+    assert printed(EXAMPLES[0].replace("default_rng(1)", "default_rng(2)"), capsys) != SHOWN[0]
+
+
+def printed(block: str, capsys) -> list[str]:
+    """What an example prints: its words, and its numbers to three digits, as a sum may differ in the last."""
+    exec(compile(block, "README.md", "exec"), {})
+    return rounded(capsys.readouterr().out)
 
 
 def test_the_readme_examples_are_short() -> None:
@@ -34,11 +58,6 @@ def test_the_readme_example_in_flatland_shows_what_reuse_is_for(capsys) -> None:
     exec(compile(EXAMPLES[2], "README.md", "exec"), {})
     traced, reused = (float(x) for x in re.findall(r"\d+\.\d+", capsys.readouterr().out))
     assert reused < traced / 3
-
-
-def test_each_readme_example_runs_by_itself() -> None:
-    for block in EXAMPLES:
-        exec(compile(block, "README.md", "exec"), {})
 
 
 # ---------------------------------------------------------------- the printed shell lines, one after the other
@@ -95,3 +114,25 @@ def test_every_other_printed_line_names_something_that_exists() -> None:
     assert [line for line in others if not line.startswith("make ")] == [". .venv/bin/activate"]
     assert all(re.search(rf"^{target}:", MAKEFILE, re.MULTILINE) for target in targets)
     assert targets == ["figures", "test", "bench"]
+
+
+# ---------------------------------------------------------------- papers and pictures
+
+
+def test_the_readme_names_every_doi_that_the_references_have_of_the_four_papers() -> None:
+    references = (ROOT / "docs" / "references.md").read_text(encoding="utf-8").partition("## Resampling")[0]
+    dois = re.findall(r"doi:\[(.*?)\]", references)
+    assert len(dois) == 3
+    assert [doi for doi in dois if doi not in README] == []
+
+
+def missing(text: str) -> list[str]:
+    """Links of a page into the checkout that lead nowhere, to a file or to a heading."""
+    headings = {re.sub(r"[^a-z0-9 -]", "", h.lower()).replace(" ", "-") for h in re.findall(r"^#+ (.*)", text, re.M)}
+    links = [link for link in re.findall(r"\]\((.*?)\)", text) if "://" not in link]
+    return [each for each in links if not (each[1:] in headings if each[0] == "#" else (ROOT / each).exists())]
+
+
+def test_links_of_the_readme_lead_to_what_is_there() -> None:
+    assert missing(README) == []
+    assert missing("## Here\n[a](#here) [b](#there) [c](docs/none.md)") == ["#there", "docs/none.md"]

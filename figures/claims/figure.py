@@ -125,10 +125,11 @@ class Figure:
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure and the module that holds it."""
+    """A figure, the module that holds it, and what that module's docstring says about it."""
 
     module: str
     figure: Figure
+    about: str = ""
 
 
 def conditions_of(figure: Figure, id_: str) -> Conditions | None:

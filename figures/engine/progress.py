@@ -1,7 +1,8 @@
 """What a run tells while it works: one bar over all chunks on a terminal, plain lines elsewhere."""
 
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -37,3 +38,20 @@ class Progress:
     def say(self, text: str) -> None:
         """A line of its own, above the bar if there is one."""
         tqdm.write(f"figures: {text}", file=sys.stderr)
+
+
+@dataclass
+class Sparing:
+    """Does something whenever it is called, if since the last time `part` of the time or less went into it."""
+
+    do: Callable[[], object]
+    part: float = 0.02
+    _again: float = field(default=0.0, repr=False)
+
+    def __call__(self) -> None:
+        """Do it, or leave it out."""
+        start = time.monotonic()
+        if start >= self._again:
+            self.do()
+            end = time.monotonic()
+            self._again = end + (end - start) / self.part

@@ -1,11 +1,13 @@
 """One run: compute the chunks that are missing, finish the figures that are complete, report.
 
-Every chunk is stored once it is done: whatever ends a run early, the same command goes on from there.
+Every chunk is stored once it is done: whatever ends a run early, the same command goes on from there.  The report is
+written at once, and again while figures finish, as far as that takes little of the time.
 """
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from figures.claims.figure import Entry
@@ -13,7 +15,7 @@ from figures.claims.ledger import Row
 from figures.claims.verdicts import Judged
 from figures.engine import audit, jobs, outdir, plan, session, store
 from figures.engine.finish import crash, finish
-from figures.engine.progress import Progress
+from figures.engine.progress import Progress, Sparing
 from figures.engine.session import Request, Session
 
 RESUME = "What was computed is stored: the same command goes on from there"
@@ -36,7 +38,6 @@ def run(
     """
     with outdir.opened(request.out, registry, progress.say):
         mine = session.begin(request, ledger, progress.say)
-        session.note(mine, "running")
         ending = _work(mine, progress)
         session.note(mine, ending.words)
         judged = request.press.report(request.out)
@@ -49,12 +50,15 @@ def run(
 def _work(mine: Session, progress: Progress) -> Ending:
     """Compute and finish."""
     total = sum(len(numbers) for numbers in mine.missing.values())
+    news = Sparing(partial(_report, mine))
     try:
+        _report(mine)
         with progress.bar(total):
             for id_ in mine.plans:
-                _finish_if_complete(mine, id_, progress)
+                if _finish_if_complete(mine, id_, progress):
+                    news()
             if total:
-                _compute(mine, progress)
+                _compute(mine, progress, news)
     except KeyboardInterrupt:
         return Ending("interrupted", 130)
     except jobs.Lost as lost:
@@ -62,12 +66,19 @@ def _work(mine: Session, progress: Progress) -> Ending:
     return Ending()
 
 
-def _compute(mine: Session, progress: Progress) -> None:
+def _report(mine: Session) -> None:
+    """The report of what is there so far."""
+    session.note(mine, "running")
+    mine.request.press.report(mine.request.out)
+
+
+def _compute(mine: Session, progress: Progress, news: Callable[[], object]) -> None:
     crew = mine.request.crew
     with crew.pool() as pool:
         for result in jobs.completed(pool, _queue(mine), window=1 if crew.size == 1 else 2 * crew.size):
             _take(mine, result, progress)
-            _finish_if_complete(mine, result.job.figure, progress)
+            if _finish_if_complete(mine, result.job.figure, progress):
+                news()
 
 
 def _queue(mine: Session) -> Iterator[jobs.Job]:
@@ -93,15 +104,17 @@ def _take(mine: Session, result: jobs.Result, progress: Progress) -> None:
         progress.step(f"{id_} chunk {number + 1} of {len(here.parts)}")
 
 
-def _finish_if_complete(mine: Session, id_: str, progress: Progress) -> None:
+def _finish_if_complete(mine: Session, id_: str, progress: Progress) -> bool:
+    """Whether the figure has become complete, and so was finished."""
     here, start = mine.plans[id_], time.perf_counter()
     if id_ in mine.records or mine.missing[id_]:
-        return
+        return False
     draw = mine.request.press.draw
     found = crash(here, mine.ledger, here.trouble) if here.trouble else finish(here, mine.ledger, draw)
     mine.records[id_] = found
     mine.seconds[id_] += time.perf_counter() - start
     progress.say(f"{id_} {found.status} ({mine.reused[id_]} of {len(here.parts)} chunks reused)")
+    return True
 
 
 def _status(mine: Session, judged: list[Judged]) -> int:

@@ -70,6 +70,7 @@ def note(session: Session, status: str) -> None:
         "jobs": request.crew.size,
         **request.crew.about,
         "started": session.started,
+        "noted": manifest.now(),
         "finished": None if status == "running" else manifest.now(),
         **session.environment,
     }

@@ -1,4 +1,4 @@
-"""Laws of the report: one page that needs nothing but itself, rebuilt from what is stored, honest about damage."""
+"""Laws of the report: a page beside its pictures, without network, rebuilt from what is stored, honest about damage."""
 
 import re
 from html.parser import HTMLParser
@@ -8,7 +8,7 @@ import pytest
 
 from figures.claims.figure import VERDICTS
 from figures.report import press, style
-from figures.report.page import SYMBOLS, badge
+from figures.report.markup import SYMBOLS, badge
 from tests.figures.demos.sound import FIGURE
 from tests.figures.project import figures, project
 
@@ -54,16 +54,18 @@ def test_links_lead_to_what_is_there(done):
     _, out = done
     links = [attrs["href"] for tag, attrs in Tags(page(out)).found if tag == "a"]
     ids = {attrs["id"] for _, attrs in Tags(page(out)).found if "id" in attrs}
-    assert {link for link in links if not link.startswith("#")} == {
-        f"{id_}/{name}" for id_ in ("DEMO-F01", "DEMO-F05") for name in ("figure.pdf", "arrays.npz")
+    files = ("figure.png", "figure.pdf", "arrays.npz")
+    assert {link for link in links if link.startswith("DEMO")} == {
+        f"{id_}/{name}" for id_ in ("DEMO-F01", "DEMO-F05") for name in files
     }
+    assert any(link.endswith("tests/figures/demos/sound.py") for link in links)
     assert all(link[1:] in ids if link[0] == "#" else (out / link).exists() for link in links)
 
 
 def test_every_picture_says_in_words_what_it_shows(done):
     pictures = [attrs for tag, attrs in Tags(page(done[1])).found if tag == "img"]
-    assert len(pictures) == 2
-    assert all(attrs["src"].startswith("data:image/png;base64,") for attrs in pictures)
+    assert [attrs["src"] for attrs in pictures] == [f"{id_}/figure.png" for id_ in ("DEMO-F01", "DEMO-F05")] * 2
+    assert all(attrs["loading"] == "lazy" and 0 < len(attrs["alt"]) <= 300 for attrs in pictures)
     assert any("Uniform <draws>" in attrs["alt"] and "reproduced" in attrs["alt"] for attrs in pictures)
 
 
@@ -72,6 +74,7 @@ def test_the_page_tells_sentence_value_criterion_verdict_and_expectation(done):
     for words in ("Sentence &lt;DEMO-C01&gt;", "0.5 ± 0.2", "✓ reproduced", "✗ refuted", "it is a uniform draw"):
         assert words in text
     assert "Uniform <draws>" not in text.replace('alt="Uniform <draws>', "")
+    assert text.index("What came out otherwise") < text.index("<img") < text.index("All claims")
 
 
 def test_every_verdict_has_a_symbol_of_its_own_and_its_word():

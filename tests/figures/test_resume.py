@@ -79,7 +79,7 @@ def test_ctrl_c_is_answered_clearly_and_loses_nothing(tmp_path, whole):
     assert status == 130
     assert "the same command goes on from there" in said
     assert "Traceback" not in said
-    assert "incomplete" in (tmp_path / "index.html").read_text()
+    assert "Ended early" in (tmp_path / "index.html").read_text()
     assert figures(here, *words) == 0
     assert arrays(tmp_path) == expected
 
@@ -191,7 +191,7 @@ def test_a_full_disk_is_told_and_the_run_goes_on_later(tmp_path, capsys, monkeyp
     here, out = project(tmp_path, "sound"), tmp_path / "out"
     assert figures(here, "run", "--out", tmp_path / "whole") == 0
     with monkeypatch.context() as patch:
-        patch.setattr(os, "fsync", Full(room=3))
+        patch.setattr(os, "fsync", Full(room=5))
         assert figures(here, "run", "--out", out) == 2
     assert "No space left on device" in capsys.readouterr().err
     stored = arrays(out)
