@@ -4,7 +4,8 @@ Every leaf ends in the batch axis, so a scalar per sample has shape (N,), a poin
 spectrum (C, N).  Scalars per sample then broadcast against vectors without `[:, None]`, and sums
 over the small leading axes stay fast.
 
-Of wide samples most columns are weighed and never kept: columns of a `Block` are named, and gathered when read.
+Of wide samples most columns are weighed and never kept: a `Block` is lazy.  `take` of it is a reference, the block
+and an index, and a field is gathered when it is first read.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,9 +22,9 @@ Batch = TypeVar("Batch")
 
 
 class Block:
-    """Base of dataclasses whose columns `take` only names: every field is gathered when it is first read.
+    """Base of dataclasses that are gathered lazily: what `take` returns is of the same class, and reads the same.
 
-    A reference is a block, an index into its columns, and the fields that it has of its own (`changed`).
+    It is a reference: a block, an index into its columns, and the fields that it has of its own (`changed`).
     """
 
     if not TYPE_CHECKING:  # which would take every name for a field
@@ -125,7 +126,10 @@ def is_reference(x: object) -> bool:
 
 
 def reference(x: Block) -> tuple[Block, Array, Mapping[str, Any]]:
-    """The block that x refers to, the index (N,) of its columns, and the fields that x has of its own."""
+    """The block that x refers to, the index (N,) of its columns, and the fields that x has of its own.
+
+    A block refers to all of itself; its first field says how many columns it has.
+    """
     if is_reference(x):
         return x.__dict__["_of"], x.__dict__["_index"], {name: x.__dict__[name] for name in x.__dict__["_own"]}
     return x, np.arange(getattr(x, names(type(x))[0]).shape[-1]), {}
@@ -157,7 +161,7 @@ def changed(x: Batch, **own: Any) -> Batch:
 
 
 def gathered(batch: Batch) -> Batch:
-    """The same with nothing left to gather."""
+    """The same with nothing left to gather: reading every leaf does it."""
     whole: Batch = map_leaves(lambda leaf: leaf, batch)
     return whole
 

@@ -19,7 +19,7 @@ from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, kep
 from restir_ref.mis import ANY, CANONICAL_COVERS, Confidences, Density, Weights
 
 LARGEST_CONFIDENCE = 2.0**100
-"""Merged confidences saturate here, so that uncapped ones, which double every frame, stay finite."""
+"""Merged confidences saturate here, so that uncapped ones, which grow geometrically, stay finite."""
 
 TOO_LARGE = "Scale p_hat: a constant factor changes no estimate, but keeps p_hat, W and their sums in range."
 
@@ -41,7 +41,7 @@ Landed = tuple[Shifted, Array]
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A sample y where we select, p_hat(y), m W (with J), and c_i/m_i (None is 1, for each on its own); each (N,)."""
+    """A sample y where we select, p_hat(y), m_i W_i J_i, and c_i/m_i, which is 1 where it is None; each (N,)."""
 
     x: Sample
     p_hat: Array
@@ -68,7 +68,7 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
 
 
 def contribution_weight(y: Candidate) -> Array:
-    """c_i W_i J_i of one candidate, which is m_i W_i J_i unless the weights differ; (N,).  [GRIS Eq. 13]"""
+    """c_i W_i J_i of one candidate, c_i its contribution MIS weight, m_i unless they differ; (N,).  [GRIS Eq. 16, 18]"""
     return y.mW if y.c_over_m is None else y.c_over_m * y.mW
 
 
@@ -120,7 +120,7 @@ def gris(inputs: Sequence[Input], here: Pixels, mis: Weights, chance: Chance) ->
 
 
 def resampling_weight(y: Candidate) -> Array:
-    """w_i = p_hat m_i W_i, checked: finite and >= 0; (N,)."""
+    """w_i = p_hat(Y_i) m_i W_i J_i, checked: finite and >= 0; (N,).  [GRIS Eq. 22]"""
     return _checked(wide(y.p_hat) * y.mW)
 
 

@@ -136,3 +136,28 @@ def missing(text: str) -> list[str]:
 def test_links_of_the_readme_lead_to_what_is_there() -> None:
     assert missing(README) == []
     assert missing("## Here\n[a](#here) [b](#there) [c](docs/none.md)") == ["#there", "docs/none.md"]
+
+
+# ---------------------------------------------------------------- files
+
+
+def missing_files(page: str) -> list[str]:
+    """Paths in backticks of the table of equations, braces expanded, that are not in the checkout."""
+    named = [name for name in re.findall(r"`([a-z0-9_]+/[^` ]*)`", page) if "*" not in name]
+    whole = [head + each + tail for head, names, tail in map(braces, named) for each in names.split(",")]
+    return [name for name in whole if not (ROOT / name).exists()]
+
+
+def braces(name: str) -> tuple[str, str, str]:
+    """What stands before, in and behind the braces of a path."""
+    head, _, rest = name.partition("{")
+    names, _, tail = rest.partition("}")
+    return head, names, tail
+
+
+def test_every_file_that_the_readme_names_is_there() -> None:
+    assert missing_files((ROOT / "README.md").read_text("utf-8")) == []
+
+
+def test_a_file_that_has_moved_is_noticed() -> None:
+    assert missing_files("`restir_ref/transport/{paths,copies}.py`") == ["restir_ref/transport/copies.py"]

@@ -62,7 +62,8 @@ def counts(judged: Sequence[Judged], beside: Beside) -> dict[str, Counter[str]]:
 
 
 def _bars(judged: Sequence[Judged], beside: Beside) -> Iterator[str]:
-    yield '<h2 id="verdicts">Claims, paper by paper</h2>\n<div class="bars">'
+    presets = " and ".join(sorted({row.preset for row in judged})) or "no"
+    yield f'<h2 id="verdicts">Claims, paper by paper, at the {presets} preset</h2>\n<div class="bars">'
     for name, count in counts(judged, beside).items():
         parts = [(how, count[how]) for how in ORDER if count[how]]
         said = ", ".join(f"{number} {how}" for how, number in parts)
@@ -110,9 +111,9 @@ def _kept(beside: Beside) -> Iterator[Failure]:
 
 
 def _why(check: Mapping[str, Any]) -> str:
-    """What was measured, against which criterion, and the first sentence of the reason."""
+    """What was measured, against which criterion, and the reason."""
     part = f"{check['part']}: " if check["part"] else ""
-    reason = sentences(check["reason"])[:1]
+    reason = sentences(check["reason"])
     return " ".join([f"{part}{show(check['measured'])}, criterion {check['criterion']}.", *reason])
 
 
@@ -127,7 +128,7 @@ def _otherwise(judged: Sequence[Judged], beside: Beside) -> Iterator[str]:
         mark = f'<span class="badge {kind(each.verdict)}">{SYMBOLS[each.verdict]} {escape(each.said)}</span>'
         there = link(f"#{place_of(each.claim, each.figure)}", each.claim)
         yield f'<li>{mark} {there} <span class="clamp">{escape(row.sentence if row else "")}</span>'
-        yield f'<span class="clamp why">{escape(each.reason)}</span></li>'
+        yield f'<span class="why">{escape(each.reason)}</span></li>'
     yield "</ul>" if found else ""
     careful = [row for row in judged if row.verdict == "reproduced with caveat" and row.figures]
     if careful:

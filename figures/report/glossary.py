@@ -24,7 +24,7 @@ MEANING: Mapping[Verdict, str] = {
     "not the paper's.",
     "refuted": "Under the paper's conditions the opposite holds, with statistical certainty, in the world and at the "
     "preset that are named.",
-    "not judged": "This preset is too small to decide; the paper preset does.",
+    "not judged": "This preset is too small to decide, or what is needed is not here; the reason says which.",
     "reported": "A number beside a claim, without a criterion.",
 }
 WORDS = {
@@ -32,6 +32,8 @@ WORDS = {
     "included. A run in which another one comes out says so, and ends with exit status 1.",
     "preset": "How much is computed: quick takes minutes, paper hours, with the papers' sample counts. What the paper "
     "preset found is kept in figures/paper.json.",
+    "by tests alone": "No figure is about the claim; tests show it, exactly where they can.",
+    "not yet": "Neither a figure nor a test shows the claim so far.",
     "world": "Where it is measured: toy1d, integrands on a line; flatland2d, light in the plane; tracer3d, light in "
     "space.",
     "criterion": "The rule by which a value passes or fails. Random error counts: what is too noisy to decide fails.",

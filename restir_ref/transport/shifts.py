@@ -1,8 +1,15 @@
-"""Shift mappings: replay until the first connectable pair of vertices, then reconnect.  [GRIS 7.2-7.5, 8.1]
+"""Shift mappings: replay until the first connectable pair of vertices, then reconnect.  [GRIS 7.2-7.6, 8.1]
 
 One code is the reconnection shift, random replay and their hybrid; only the rule of connectability
-differs.  In primary sample space the Jacobian is J = A(y) / A(x) with one number A per path: the
-density with which primary samples produce the reconnection vertex and the direction leaving it.
+differs.  (Where x_1 or x_2 cannot be connected, `RECONNECTION` replays it and connects behind; what joins
+x_2 or nothing is `restir_pt.ReconnectionAtX2`.)  In primary sample space the Jacobian is J = A(y) / A(x)
+with one number A per path: the density with which primary samples produce the reconnection vertex and
+the direction leaving it,
+
+    A = p |cos| / r^(d-1) p_out,
+
+p of the direction from x_(c-1), r and cos where it arrives at x_c, p_out of the direction leaving x_c, where
+one was sampled: A(y) / A(x) is [GRIS Eq. 54] with [GRIS Eq. 52] put in, which has d = 3.
 """
 
 from dataclasses import dataclass
@@ -28,10 +35,10 @@ from restir_ref.transport.vectors import norm
 
 @dataclass(frozen=True)
 class Prefix:
-    """A replayed path up to its last free vertex y_s, which is on the light if a BSDF sample finds it.
+    """A path up to its last replayed vertex y_s, which is on the light if a BSDF sample finds it.
 
     v, r (N,), p_all (N,)  y_s, its distance from y_(s-1), and the density of that direction over all lobes
-    T (C, N), legal (N,)   the throughput that arrives there, and whether the path may
+    T (C, N), legal (N,)   the throughput (not the shift) that arrives there, and whether the path may
     """
 
     v: Vertex
@@ -42,9 +49,10 @@ class Prefix:
 
 
 def shift_path(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
-    """The offset path in `pixel` (N,) of tracer t, and J (N,), 0 where undefined.
+    """The offset path y = T(x) in `pixel` (N,) of tracer t, and J = A(y) / A(x) (N,), 0 where undefined.
 
-    Columns are sorted once by what follows their free part, and what follows is computed for slices.
+    Columns are sorted once by what follows the replayed vertices: a light that a BSDF sample meets, light
+    sampling, or the reconnection; each is then computed for a slice of columns.
     """
     replayed = x.c == 0
     kinds = [np.flatnonzero(kind) for kind in (replayed & ~x.nee, replayed & x.nee, ~replayed)]
@@ -63,7 +71,10 @@ def shift_path(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
 
 
 def replay(t: Tracer, x: Path, pixel: Array) -> Prefix:
-    """Trace y_1 .. y_s with x's numbers; illegal where a pair connects before x's does."""
+    """Trace y_1 .. y_s with x's numbers; illegal where light gets lost, or a pair connects before x's does.
+
+    Not illegal is what ends dark: a path onto a light that sends nothing this way is a path with F = 0.
+    """
     s = np.where(x.c > 0, x.c - 1, np.where(x.nee, x.k, x.k + 1))
     v, r, T = first_hit(t, head(x, "u", t.sensor.numbers), pixel)
     y = Prefix(v, r, np.zeros(len(s)), np.array(T), T.any(axis=0) | (x.k == 0))
@@ -87,7 +98,7 @@ def _step(t: Tracer, x: Path, y: Prefix, i: int) -> Prefix:
 
 
 def _roughness_of_y(t: Tracer, x: Path, v: Vertex, i: int) -> Array:
-    """Roughness that judges y_i: of the lobe that will leave it, its roughest before light sampling."""
+    """Roughness that judges y_i: of the lobe leaving it, copied if it reconnects, its roughest before light sampling."""
     table = t.scene.materials
     lobe = np.where(x.c == i + 1, x.lobe_in, mat.choose_lobe(mat.lobe_shares(table, v), t.lobe_number(x.u, i)))
     by_light = (x.c == 0) & x.nee & (x.k == i)
@@ -109,7 +120,7 @@ def _light_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
 
 
 def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
-    """Connect y_(c-1) to x_c: F, A, and whether the connection is legal.  [GRIS Eq. 52, 54]"""
+    """Connect y_(c-1) to x_c: F, A = p |cos| / r^(d-1) p_out, and whether it is legal.  [GRIS Eq. 52, 54]"""
     s, table, space = t.scene, t.scene.materials, t.scene.space
     to = x.z - y.v.x
     r = np.maximum(norm(to), 1e-300)
@@ -129,7 +140,7 @@ def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
 
 
 def _roughness_of_z(t: Tracer, x: Path, z: Vertex) -> Array:
-    """Roughness that judges x_c: of its outgoing lobe, its roughest before light sampling, 1 on lights."""
+    """Roughness that judges x_c: of its outgoing lobe, its roughest before light sampling, 1 on lights.  [GRIS 7.6]"""
     table = t.scene.materials
     by_lobe = np.where(x.nee & (x.c == x.k), mat.roughest(table, z), mat.lobe_roughness(table, z, x.lobe_out))
     return np.where(x.c > x.k, 1.0, by_lobe)
