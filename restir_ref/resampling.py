@@ -68,7 +68,7 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
 
 
 def contribution_weight(y: Candidate) -> Array:
-    """c_i W_i J_i of one candidate, c_i its contribution MIS weight, m_i unless they differ; (N,).  [GRIS Eq. 16, 18]"""
+    """c_i W_i J_i of one candidate, c_i its contribution MIS weight, mostly m_i; (N,).  [GRIS Eq. 16, 18]"""
     return y.mW if y.c_over_m is None else y.c_over_m * y.mW
 
 

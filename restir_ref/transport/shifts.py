@@ -98,7 +98,7 @@ def _step(t: Tracer, x: Path, y: Prefix, i: int) -> Prefix:
 
 
 def _roughness_of_y(t: Tracer, x: Path, v: Vertex, i: int) -> Array:
-    """Roughness that judges y_i: of the lobe leaving it, copied if it reconnects, its roughest before light sampling."""
+    """Roughness of y_i: of the lobe leaving it (copied by a reconnection), its roughest before light sampling."""
     table = t.scene.materials
     lobe = np.where(x.c == i + 1, x.lobe_in, mat.choose_lobe(mat.lobe_shares(table, v), t.lobe_number(x.u, i)))
     by_light = (x.c == 0) & x.nee & (x.k == i)
