@@ -19,7 +19,7 @@ from restir_ref.integrals import Pixels, Proxy, Reservoirs, Sample, Shifted, kep
 from restir_ref.mis import ANY, CANONICAL_COVERS, Confidences, Density, Weights
 
 LARGEST_CONFIDENCE = 2.0**100
-"""Merged confidences saturate here, so that uncapped ones, which grow geometrically, stay finite."""
+"""Merged confidences saturate here, so that uncapped ones, which double every frame, stay finite."""
 
 TOO_LARGE = "Scale p_hat: a constant factor changes no estimate, but keeps p_hat, W and their sums in range."
 

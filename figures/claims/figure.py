@@ -125,11 +125,10 @@ class Figure:
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure, the module that holds it, and what that module's docstring says about it."""
+    """A figure and the module that holds it."""
 
     module: str
     figure: Figure
-    about: str = ""
 
 
 def conditions_of(figure: Figure, id_: str) -> Conditions | None:

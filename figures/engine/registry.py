@@ -48,10 +48,9 @@ def load(modules: Iterable[str]) -> dict[str, Entry]:
 
 def _import(name: str) -> Entry:
     try:
-        module = importlib.import_module(name)
+        figure = vars(importlib.import_module(name)).get("FIGURE")
     except Exception as error:
         raise FigureError(f"cannot import figure module {name}:\n{traceback.format_exc()}") from error
-    figure = vars(module).get("FIGURE")
     if not isinstance(figure, Figure):
         raise FigureError(
             f"{name} stands among the figures and holds no FIGURE = Figure(...): give it one, "
@@ -60,7 +59,7 @@ def _import(name: str) -> Entry:
     problems = list(faults(figure))
     if problems:
         raise FigureError(f"{name}.FIGURE: " + "; ".join(problems))
-    return Entry(name, figure, module.__doc__ or "")
+    return Entry(name, figure)
 
 
 def faults(figure: Figure) -> Iterator[str]:

@@ -12,6 +12,7 @@ from figures.engine.gather import Shown
 from figures.report.beside import Beside, chain, module_link
 from figures.report.glossary import linked
 from figures.report.markup import badge, link, place_of, row_of, short, two_sentences
+from figures.report.sources import about
 from figures.report.style import RC
 
 SETUP = {"loop": "Loop", "camera": "Camera", "light": "Light", "view": "View"}
@@ -86,7 +87,7 @@ def _about(record: Record, beside: Beside) -> Iterator[str]:
 
 def _said(record: Record, beside: Beside) -> str:
     entry = beside.entries.get(record.id)
-    return two_sentences(entry.about) if entry else ""
+    return two_sentences(about(entry)) if entry else ""
 
 
 # ---------------------------------------------------------------- the picture

@@ -2,11 +2,13 @@
 
 import ast
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from figures.claims.figure import Entry
 from figures.report.markup import sentences
 
 PACKAGES = ("restir_ref", "toy1d", "flatland2d", "tracer3d")
@@ -23,6 +25,11 @@ class Place:
     path: str
     line: int
     name: str
+
+
+def about(entry: Entry) -> str:
+    """What the docstring of a figure's module says."""
+    return sys.modules[entry.module].__doc__ or ""
 
 
 @cache

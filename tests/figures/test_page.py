@@ -13,7 +13,7 @@ from figures.report.glossary import PAPERS, known_scenes, linked
 from figures.report.markup import two_sentences
 from figures.report.page import STYLE
 from figures.report.running import ahead, duration, told
-from figures.report.sources import cited, numbers
+from figures.report.sources import about, cited, numbers
 from tests.figures.project import figures, project
 
 LEDGER = json.loads((ROOT / "figures" / "ledger.json").read_text())["claims"]
@@ -42,7 +42,7 @@ def test_a_figure_is_told_in_the_first_two_sentences_of_its_module(text, said):
 def test_every_figure_says_what_it_shows():
     from figures.engine.registry import load  # noqa: PLC0415
 
-    assert all(len(two_sentences(entry.about)) > 40 for entry in load(Project().modules).values())
+    assert all(len(two_sentences(about(entry))) > 40 for entry in load(Project().modules).values())
 
 
 @pytest.mark.parametrize(
