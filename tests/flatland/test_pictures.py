@@ -315,7 +315,12 @@ def test_the_words_of_a_legend_stay_inside_the_picture():
 
 
 def test_a_legend_of_longer_words_would_be_cut():
-    assert room_at_the_right({"connectable by this rule": "connectable by this rule, whatever the lobes"}) < 0
+    assert (
+        room_at_the_right(
+            {"connectable by this rule": "connectable by this rule, whatever the lobes of both vertices may be"}
+        )
+        < 0
+    )
 
 
 def marks(ax):
