@@ -315,12 +315,8 @@ def test_the_words_of_a_legend_stay_inside_the_picture():
 
 
 def test_a_legend_of_longer_words_would_be_cut():
-    assert (
-        room_at_the_right(
-            {"connectable by this rule": "connectable by this rule, whatever the lobes of both vertices may be"}
-        )
-        < 0
-    )
+    words = "connectable by this rule"
+    assert room_at_the_right({words: f"{words}, whatever the lobes of both vertices may be"}) < 0
 
 
 def marks(ax):
