@@ -22,7 +22,7 @@ LONGEST_ALT = 300
 def badge(verdict: Verdict | None, where: str = "", preset: str = "") -> str:
     """A verdict by symbol and word, colour only repeats it; what is refuted or not judged says where."""
     if verdict is None:
-        return '<span class="badge none">– not measured</span>'
+        return '<span class="badge none">– no figure</span>'
     return f'<span class="badge {kind(verdict)}">{SYMBOLS[verdict]} {words(verdict, where, preset)}</span>'
 
 

@@ -48,7 +48,7 @@ def _choices(ids: Sequence[str], beside: Beside) -> dict[str, dict[str, str]]:
     return {
         "paper": {"": "all", **{f"p-{name}": name for name in dict.fromkeys(map(paper, ids))}},
         "world": {"": "all", **{f"w-{name}": name for name in dict.fromkeys(worlds)}},
-        "verdict": {"": "all", **{f"v-{kind(name)}": name for name in VERDICTS}, "v-none": "not measured"},
+        "verdict": {"": "all", **{f"v-{kind(name)}": name for name in VERDICTS}, "v-none": "no figure"},
     }
 
 
@@ -73,7 +73,9 @@ def _body(id_: str, judged: Judged | None, beside: Beside, place: str) -> Iterat
     """A claim's rows, one per check; the claim itself and what is expected of it span them."""
     row, checks = beside.ledger.get(id_), judged.checks if judged else ()
     verdict = judged.verdict if judged else None
-    classes = [f"p-{paper(id_)}", f"v-{kind(verdict)}", *(f"w-{world}" for world in (row.worlds if row else ()))]
+    shown = {beside.entries[figure].figure.world for figure, _ in checks if figure in beside.entries}
+    worlds = sorted(shown) or (row.worlds if row else ())  # those of its figures; without any, those it is meant for
+    classes = [f"p-{paper(id_)}", f"v-{kind(verdict)}", *(f"w-{world}" for world in worlds)]
     yield f'<tbody class="row {escape(" ".join(classes))}"{place}>'
     span = f' rowspan="{max(1, len(checks))}"'
     cells = [_check(check, judged) for _, check in checks if judged] or [_nothing(row)]

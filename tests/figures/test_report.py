@@ -81,7 +81,7 @@ def test_every_verdict_has_a_symbol_of_its_own_and_its_word():
     assert set(SYMBOLS) == set(VERDICTS)
     assert len(set(SYMBOLS.values())) == len(VERDICTS)
     assert all(SYMBOLS[verdict] in badge(verdict) and verdict in badge(verdict) for verdict in VERDICTS)
-    assert "not measured" in badge(None)
+    assert "no figure" in badge(None)
 
 
 def test_the_report_is_rebuilt_from_what_is_stored(done):
