@@ -40,7 +40,7 @@ KERNEL = {
     "mis._pair: ...canonical[{0 => -1}]...": SAME_DENSITY,
     "resampling.correction: ...np.ones_like(y.{mW => p_hat})...": "a factor of 1 for each column",
     "mis.Confidences._numbers: ...{, copy=False => }...": "a copy has the same numbers",
-    "restir.reusing: place = {int(np.argmax(...": "a number prints alike, whatever its type",
+    "restir.reusing: place = {int(...=> np.argmax(...": "a number prints alike, whatever its type",
     "resampling: ONE = {np.array(1) => 1}": "a factor of 1, as an array or not",
     "resampling._densities.q: ...inputs[{i => j}]...": "i = j in this branch",
     "resampling._check_input: for ...source.X.c), ('weight W', source.X.W})):": "which of two mistakes is named first",

@@ -173,7 +173,7 @@ def _densities(i: int, landed: Sequence[Landed], inputs: Sequence[Input], here: 
         others = [j for j, source in enumerate(inputs) if source.at is not here and j != i]
         ats = [inputs[j].at for j in others]
         xs = shifted_together([y.x] * len(others), [here] * len(others), ats)
-        kept_apart([*away[:1], *xs[:1]])
+        kept_apart([*away[:1], *xs[:1]])  # a buffer that shift() fills again begins where its first results do
         return {j: x.J * proxy(at, x.x) for j, at, x in zip(others, ats, xs, strict=True)}
 
     @cache

@@ -14,7 +14,11 @@ from pathlib import Path
 
 from figures.claims.errors import FigureError
 
-WORLDS = {"toy1d": "toy1d", "core": "toy1d", "oracle": "toy1d", "flatland": "flatland2d", "transport": "flatland2d"}
+WORLDS = {
+    **dict.fromkeys(("toy1d", "core", "oracle"), "toy1d"),
+    **dict.fromkeys(("flatland", "transport"), "flatland2d"),
+    "tracer3d": "tracer3d",
+}
 """What the folders of tests are about; all others are units, such as the engine."""
 
 Definition = ast.FunctionDef | ast.AsyncFunctionDef

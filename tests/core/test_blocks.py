@@ -102,6 +102,12 @@ def test_what_is_changed_stays_changed_however_often_columns_are_taken(n, data):
     assert same(take(x, two), replace(wide(*np.array(n)[one[two]]), f=f[two]))
 
 
+def test_two_changes_of_different_fields_both_stay():
+    x = changed(changed(take(wide(1, 2, 3), np.array([2, 0])), f=np.array([7.0, 8.0])), k=np.array([5, 6]))
+    assert is_reference(x)
+    assert same(x, replace(wide(3, 1), f=np.array([7.0, 8.0]), k=np.array([5, 6])))
+
+
 def test_a_reference_that_forgot_what_was_changed_would_be_noticed():
     x = changed(take(wide(1, 2, 3), np.array([2, 0])), f=np.array([7.0, 8.0]))
     of, index, _ = reference(x)

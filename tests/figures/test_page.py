@@ -9,12 +9,13 @@ from figures.claims.figure import VERDICTS
 from figures.engine.manifest import ROOT
 from figures.engine.progress import Sparing
 from figures.project import Project
+from figures.report.front import NOTHING, TESTS
 from figures.report.glossary import PAPERS, known_scenes, linked
-from figures.report.markup import two_sentences
+from figures.report.markup import two_sentences, word
 from figures.report.page import STYLE
 from figures.report.running import ahead, duration, told
 from figures.report.sources import about, cited, numbers
-from tests.figures.project import figures, project
+from tests.figures.project import claim, figures, project
 
 LEDGER = json.loads((ROOT / "figures" / "ledger.json").read_text())["claims"]
 
@@ -93,7 +94,13 @@ def test_the_words_of_a_page_are_explained_once(done):
     text = (done[1] / "index.html").read_text()
     places = re.findall(r'id="([^"]+)"', text)
     assert len(places) == len(set(places))
-    assert {f"word-{verdict.replace(' ', '-')}" for verdict in VERDICTS} <= set(places)
+    assert {word(each) for each in (*VERDICTS, TESTS, NOTHING)} <= set(places)
+
+
+def test_what_came_out_otherwise_has_its_whole_reason_and_bars_their_preset(done):
+    first, _ = (done[1] / "index.html").read_text().split('id="gallery"')
+    assert "it is a uniform draw. Its mean is a half." in first
+    assert "paper by paper, at the quick preset</h2>" in first
 
 
 def test_the_filter_hides_by_paper_world_and_verdict(done):
@@ -101,6 +108,13 @@ def test_the_filter_hides_by_paper_world_and_verdict(done):
     for name, value in (("paper", "p-DEMO"), ("world", "w-toy1d"), ("verdict", "v-refuted"), ("verdict", "v-none")):
         assert f'main:has(#by-{name} option[value="{value}"]:checked) tbody.row:not(.{value})' in text
         assert f'<option value="{value}">' in text
+    assert '<tbody class="row p-DEMO v-refuted w-toy1d" id="claim-DEMO-C02">' in text
+
+
+def test_a_claim_is_found_by_the_world_that_shows_it_not_by_one_it_is_meant_for(tmp_path):
+    claims = claim(), claim("DEMO-C02", quick="refuted") | {"worlds": ["toy1d", "tracer3d"]}
+    figures(project(tmp_path, "refuted", claims=claims), "run", "--out", tmp_path / "out", "--jobs", "1")
+    text = (tmp_path / "out" / "index.html").read_text()
     assert '<tbody class="row p-DEMO v-refuted w-toy1d" id="claim-DEMO-C02">' in text
 
 
