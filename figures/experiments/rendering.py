@@ -75,8 +75,11 @@ def lattice_tracing(light: Light = radiance) -> Renderer:
         t, total = of.tracer, np.zeros(len(index))
         powers = np.array([pow(GENERATOR, j, POINTS) for j in range(t.D)])[:, None]
         by = chance.uniform((t.D, len(index)))
-        for k in range(POINTS):
-            total += light(trace(t, (powers * k % POINTS / POINTS + by) % 1, index % of.n)).mean(axis=0)
+        for some in np.array_split(np.arange(POINTS), -(-POINTS * len(index) // COLUMNS)):
+            points = (powers * some % POINTS / POINTS)[:, :, None] + by[:, None]
+            tree = trace(t, (points % 1).reshape(t.D, -1), np.tile(index % of.n, len(some)))
+            for found in light(tree).mean(axis=0).reshape(len(some), -1):
+                total += found
         return total / POINTS
 
     return render

@@ -295,7 +295,7 @@ FIGURE = Figure(
     presets={
         "quick": {
             "short": {"caps": [1, 2, 4, 5], "replicas": [12, 12, 12, 12], "frames": 200, "blocks": 1},
-            "long": {"caps": [3, 6, 7], "replicas": [12, 12, 8], "frames": 1000, "blocks": 1},
+            "long": {"caps": [3, 6, 7], "replicas": [8, 8, 8], "frames": 1000, "blocks": 1},
             "spatial": {"frames": 4000},
         },
         "paper": {

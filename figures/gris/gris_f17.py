@@ -315,7 +315,7 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"path tracing": 1024, "path reuse": 1024, "reconnection": 96, "hybrid": 96, "shifts": 64},
+        "quick": {"path tracing": 1024, "path reuse": 512, "reconnection": 96, "hybrid": 96, "shifts": 64},
         "paper": {"path tracing": 8192, "path reuse": 8192, "reconnection": 1024, "hybrid": 1024, "shifts": 512},
     },
     chunks=chunks,
