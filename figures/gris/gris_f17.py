@@ -17,8 +17,9 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import offline
-from figures.experiments.flatland import TEN, view
+from figures.experiments.flatland import TEN
 from figures.experiments.rendering import means
+from figures.experiments.views import view
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Live

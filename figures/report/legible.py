@@ -85,7 +85,7 @@ def drawn(text: "Text") -> bool:
 
 def axes(picture: "Picture") -> "list[Axes]":
     """All panels, those inside others included."""
-    found = list(picture.axes)
+    found: list[Any] = list(picture.axes)
     for each in found:  # grows by what it finds
         found += each.child_axes
     return [each for each in found if each.get_visible()]
