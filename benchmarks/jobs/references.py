@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.jobs.job import Done, Job, Params, Row, parts
+from benchmarks.jobs.job import ROOT, Done, Job, Params, Row, parts
 from figures.claims.figure import Arrays
 from figures.experiments.references import PATH, Reference, fingerprint, save
 from flatland2d.radiosity import cut, render
@@ -165,7 +165,7 @@ def publish(done: Done, root: Path) -> None:
     scenes = dict.fromkeys(params["scene"] for params, _ in done)
     save(
         {scene: exact.get(scene) or traced(done, scene) for scene in scenes},
-        root / "figures" / "experiments" / PATH.name,
+        root / PATH.relative_to(ROOT),
     )
 
 

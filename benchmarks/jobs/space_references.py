@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.jobs.job import Done, Job, Params, Row, parts
+from benchmarks.jobs.job import ROOT, Done, Job, Params, Row, parts
 from benchmarks.jobs.references import traced
 from figures.claims.figure import Arrays
 from figures.experiments.references import INDIRECT, PATH, fingerprint, key_of, save
@@ -68,7 +68,7 @@ def publish(done: Done, root: Path) -> None:
     for scene, light in WANTED:
         mine = traced([each for each in done if each[0]["light"] == light], scene)
         found[key_of(scene, light)] = replace(mine, samples=len(done) // len(WANTED) * POINTS)
-    save(found, root / "figures" / "experiments" / PATH.name)
+    save(found, root / PATH.relative_to(ROOT))
 
 
 JOB = Job("Reference images of the crops of space", chunks, compute, judge, identity)
