@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from figures.experiments.flatland import RULES, moving
+from figures.experiments.flatland import moving
 from figures.experiments.rendering import path_tracing
+from figures.experiments.views import RULES
 from figures.report import style
 from flatland2d import SCENES
 from flatland2d.motion import motion, sources

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from figures.experiments.flatland import RULES
+from figures.experiments.views import RULES
 from figures.gris.gris_f05 import PIXEL, by_hand, corridor, tracer
 from figures.report import style
 from figures.trust.flat_scenes import whole_film

@@ -1,6 +1,7 @@
 """Images of rows and columns, pixel = row * columns + column: neighbours in a disk, tiles, neighbours that see alike.
 
-What `loop` does in a row of pixels; here distances are those of the plane.
+What `loop` does in a row of pixels; here distances are those of the plane.  An image may consist of several crops of
+the same shape, pixel by pixel one after the other: neighbours are those of the same crop.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +26,7 @@ def random_in_disk(shape: Shape) -> Around:
     """Neighbours uniform in the disk of a radius around each pixel of rows x columns, mirrored at the borders.
 
     Near a border a mirrored one can be the pixel itself, which is unbiased, only no news.
-    The choice raises ValueError for a radius below 1, and for images of another number of pixels.
+    The choice raises ValueError for a radius below 1, and for images that are not whole crops of that shape.
     """
 
     def around(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
@@ -113,9 +114,9 @@ def _first_alike(alike: Alike, of: Image, index: Array, tried: Sequence[Pixels])
 def _moved(of: Image, shape: Shape, index: Array, step: Array) -> Pixels:
     """Steps (2, N) away, mirrored at the borders: a wave of period 2 (rows - 1) down, 2 (columns - 1) aside."""
     rows, columns = shape
-    if rows * columns != of.n:
+    if of.n % (rows * columns):
         raise ValueError(f"neighbours were asked for in {rows} x {columns} pixels, but the image has {of.n}.")
-    pixel = index % of.n
+    pixel = index % (rows * columns)
     row, column = _mirrored(pixel // columns + step[0], rows), _mirrored(pixel % columns + step[1], columns)
     return Pixels(of, index - pixel + row * columns + column)
 

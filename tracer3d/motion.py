@@ -12,7 +12,7 @@ from restir_ref.integrals import NOWHERE
 from restir_ref.transport.rays import arrive
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import norm
-from tracer3d.sensors import Pinhole
+from tracer3d.sensors import Mosaic, Pinhole
 
 SAME = 1e-9
 """Points nearer than this share of the scene's extent are one."""
@@ -48,6 +48,12 @@ def motion(scene: Scene, now: Pinhole, before: Pinhole) -> Motion:
     w, _, _ = arrive(scene, *before.ray(source, u)[:2])
     inside = ((place >= 0) & (place < most)).all(axis=0)
     return Motion(v.x, place, source, met & inside & (norm(w.x - v.x) <= SAME * scene.extent), before.shape)
+
+
+def mosaic_sources(scene: Scene, now: Mosaic, before: Mosaic) -> Array:
+    """The previous pixel to take history from, (n,), crop by crop: `Motion.source` of each."""
+    pairs = zip(now.crops(), before.crops(), strict=True)
+    return np.concatenate([motion(scene, *pair).source + k * before.pinhole.n for k, pair in enumerate(pairs)])
 
 
 def sources(m: Motion, index: Array) -> Array:

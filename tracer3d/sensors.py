@@ -1,6 +1,6 @@
 """A pinhole camera, whose images are crops of a film."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,12 +75,16 @@ class Pinhole:
 
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A ray through the pixel; box filter, weight 1."""
+        return self.through(self.left + pixel % self.width + u[0], self.top + pixel // self.width + u[1])
+
+    def through(self, column: Array, row: Array) -> tuple[Array, Array, Array]:
+        """Rays through places of the film (N,), pixels count from its top left corner; weight 1."""
         forward, right, up = self.axes()
         columns, rows = self.film
-        s = (2 * (self.left + pixel % self.width + u[0]) / columns - 1) * self.half
-        t = (rows - 2 * (self.top + pixel // self.width + u[1])) / columns * self.half
+        s = (2 * column / columns - 1) * self.half
+        t = (rows - 2 * row) / columns * self.half
         w = normalize(forward + s * right + t * up)
-        return np.broadcast_to(np.array(self.eye, dtype=float)[:, None], w.shape), w, np.ones(len(pixel))
+        return np.broadcast_to(np.array(self.eye, dtype=float)[:, None], w.shape), w, np.ones(len(column))
 
     def project(self, x: Array) -> Array:
         """Where points (3, N) are on the crop, column and row, also beyond its borders; inf behind the eye; (2, N)."""
@@ -97,6 +101,49 @@ class Pinhole:
         forward = normalize(np.subtract(self.towards, self.eye, dtype=float)[:, None])
         right = normalize(np.cross(forward, np.array(self.up, dtype=float)[:, None], axis=0))
         return forward, right, np.cross(right, forward, axis=0)
+
+
+@dataclass(frozen=True)
+class Mosaic:
+    """Several crops of one film as one image: equally large, and pixels are numbered crop by crop.
+
+    pinhole  the camera, whose own crop has the size of each;  corners  column and row of the film where each begins
+    No pixel has neighbours in another crop.  Raises ValueError for no crop and for one off the film.
+    """
+
+    pinhole: Pinhole
+    corners: tuple[tuple[int, int], ...]
+
+    def __post_init__(self) -> None:
+        if not self.corners:
+            raise ValueError("a mosaic needs the corner of at least one crop, but has none.")
+        self.crops()
+
+    def crops(self) -> list[Pinhole]:
+        """Each crop as a camera of its own."""
+        return [replace(self.pinhole, left=left, top=top) for left, top in self.corners]
+
+    @property
+    def n(self) -> int:
+        """Number of pixels of all crops."""
+        return len(self.corners) * self.pinhole.n
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of each crop."""
+        return self.pinhole.shape
+
+    @property
+    def numbers(self) -> int:
+        """Two numbers: the place in the pixel, to the right and down."""
+        return self.pinhole.numbers
+
+    def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
+        """A ray through the pixel; box filter, weight 1."""
+        crop, place = np.divmod(pixel, self.pinhole.n)
+        left, top = np.array(self.corners).T[:, crop]
+        width = self.pinhole.width
+        return self.pinhole.through(left + place % width + u[0], top + place // width + u[1])
 
 
 def _check_crop(what: str, first: int, count: int, film: int) -> None:

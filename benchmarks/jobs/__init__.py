@@ -14,6 +14,7 @@ from benchmarks.jobs import (
     references,
     retracing,
     roundtrips,
+    space_references,
     tracing,
 )
 from benchmarks.jobs.job import Done, Job
@@ -22,6 +23,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
     {
         "references": references.JOB,
         "indirect references": indirect_references.JOB,
+        "space references": space_references.JOB,
         "round trips": roundtrips.JOB,
         "re-tracing": retracing.JOB,
         "extremes": extremes.JOB,
@@ -33,6 +35,10 @@ JOBS: Mapping[str, Job] = MappingProxyType(
     }
 )
 PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType(
-    {"references": references.publish, "indirect references": indirect_references.publish}
+    {
+        "references": references.publish,
+        "indirect references": indirect_references.publish,
+        "space references": space_references.publish,
+    }
 )
 """What else a job leaves behind, in the checkout at a path."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.jobs.job import Done, Job, Params, Row, parts
+from benchmarks.jobs.job import ROOT, Done, Job, Params, Row, parts
 from benchmarks.jobs.references import (
     CHECKS,
     CHUNKS,
@@ -92,7 +92,7 @@ def quantiles(s: Scene, count: int) -> tuple[Array, Array]:
 
 def identity(params: Params) -> str:
     """The scene, and for radiosity how fine it is."""
-    scene = f"indirect, {fingerprint(SCENES[params['scene']]())}"
+    scene = f"indirect, {fingerprint(params['scene'])}"
     return f"{scene}, panels {PANELS}, film {FILM}" if params["part"] == "radiosity" else scene
 
 
@@ -129,7 +129,7 @@ def publish(done: Done, root: Path) -> None:
     exact = refined(done)
     scenes = dict.fromkeys(params["scene"] for params, _ in done)
     found = {key_of(scene, INDIRECT): exact.get(scene) or traced(done, scene) for scene in scenes}
-    save(found, root / "figures" / PATH.name)
+    save(found, root / PATH.relative_to(ROOT))
 
 
 JOB = Job("Reference images of indirect light", chunks, compute, judge, identity)

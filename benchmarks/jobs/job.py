@@ -24,7 +24,7 @@ from figures.engine import disk, store, syntax
 
 ROOT = Path(__file__).parents[2]
 SEED = 20_220_701
-OURS = ("restir_ref", "flatland2d", "toy1d", "benchmarks", "tests", "figures")
+OURS = ("restir_ref", "flatland2d", "tracer3d", "toy1d", "benchmarks", "tests", "figures")
 
 Params = Mapping[str, Any]
 Done = Sequence[tuple[Params, Arrays]]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.jobs.job import Done, Job, Params, Row, parts
+from benchmarks.jobs.job import ROOT, Done, Job, Params, Row, parts
 from figures.claims.figure import Arrays
 from figures.experiments.references import PATH, Reference, fingerprint, save
 from flatland2d.radiosity import cut, render
@@ -90,7 +90,7 @@ def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
 
 def identity(params: Params) -> str:
     """The scene, and for radiosity how fine it is; whatever transport becomes is tested against these references."""
-    scene = fingerprint(SCENES[params["scene"]]())
+    scene = fingerprint(params["scene"])
     return f"{scene}, panels {PANELS}, film {FILM}" if params["part"] == "radiosity" else scene
 
 
@@ -163,7 +163,10 @@ def publish(done: Done, root: Path) -> None:
     """Store the references for the figures."""
     exact = refined(done)
     scenes = dict.fromkeys(params["scene"] for params, _ in done)
-    save({scene: exact.get(scene) or traced(done, scene) for scene in scenes}, root / "figures" / PATH.name)
+    save(
+        {scene: exact.get(scene) or traced(done, scene) for scene in scenes},
+        root / PATH.relative_to(ROOT),
+    )
 
 
 JOB = Job("Reference images of all scenes", chunks, compute, judge, identity)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from figures.claims.figure import Arrays
-from figures.experiments.flatland import view
 from figures.experiments.realtime import Method
+from figures.experiments.views import view
 from flatland2d import radiosity
 from flatland2d.gbuffer import gbuffer
 from flatland2d.scenes import Setting

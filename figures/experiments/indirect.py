@@ -6,9 +6,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from figures.experiments.flatland import HYBRID
 from figures.experiments.realtime import Method
 from figures.experiments.split_light import IndirectIntegrals
+from figures.experiments.views import HYBRID
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted

@@ -1,4 +1,4 @@
-"""Offline renderers of indirect light in flatland, frame by independent frame, at equal samples, rays and time.
+"""Offline renderers of indirect light, frame by independent frame, at equal samples, rays and time.
 
 Direct light is out of the picture.  [GRIS 9.1, 9.3]  Path tracing is stored in units of UNIT trees: as many make an
 image as its price allows.
@@ -13,20 +13,19 @@ from typing import Any
 import numpy as np
 
 from figures.claims.figure import Arrays
-from figures.experiments.flatland import HYBRID, view
 from figures.experiments.indirect import IndirectReconnection, darkened
 from figures.experiments.references import INDIRECT, reference
 from figures.experiments.rendering import Renderer, estimates, means, offline, path_tracing
 from figures.experiments.split_light import IndirectIntegrals
-from flatland2d.sensors import Pinhole
+from figures.experiments.views import HYBRID, tile_order, view
 from restir_ref.batch import Array, total
 from restir_ref.chance import Chance, Live
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import OFFLINE
 from restir_ref.restir import reuse_all
-from restir_ref.transport.baselines.path_reuse import TILE, TileIntegrals, not_shared, rest_of_tile
+from restir_ref.transport.baselines.path_reuse import TileIntegrals, not_shared, rest_of_tile
 from restir_ref.transport.baselines.restir_di import indirect_light
-from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer, trace
+from restir_ref.transport.paths import RECONNECTION, Connectability, Sensor, Tracer, trace
 from restir_ref.transport.restir_pt import PathIntegrals
 
 UNIT = 4
@@ -51,12 +50,14 @@ class Method:
 
 def reused(of: PathIntegrals, index: Array, chance: Chance) -> Array:
     """One tree per pixel, reused by its tile, without direct light: `path_reuse` of darkened trees."""
-    t = of.tracer
-    tree = darkened(trace(t, chance.uniform((t.D, len(index))), index % of.n))
+    t, (order, tile) = of.tracer, tile_order(of)
+    tree = darkened(trace(t, chance.uniform((t.D, len(index))), order[index % of.n]))
     here = Pixels(TileIntegrals(t, tree), np.arange(len(index)))
     kept = [Reservoirs(x, W, np.ones(len(W))) for x, W in here.of.candidates(here.index, chance)]
-    images = [not_shared(tree), *(reuse_all(X, here, rest_of_tile(here, TILE)) for X in kept)]
-    return np.asarray(total(images).mean(axis=0))
+    images = [not_shared(tree), *(reuse_all(X, here, rest_of_tile(here, tile)) for X in kept)]
+    shared, images_of = total(images).mean(axis=0), np.empty((len(index) // of.n, of.n))
+    images_of[:, order] = shared.reshape(-1, of.n)
+    return images_of.reshape(-1)
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(
@@ -79,7 +80,7 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     return render(METHODS[chunk["method"]], chunk["scene"], preset[chunk["method"]], rng)
 
 
-def render(method: Method, scene: str, count: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
+def render(method: Method, scene: str, count: int, rng: np.random.Generator, sensor: Sensor | None = None) -> Arrays:
     """Independent images (count, n) of the scene's inset, or of another sensor, and rays per pixel of one.
 
     Rays towards lights from x_1 are not charged: their leaves are black.

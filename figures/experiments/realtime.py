@@ -1,7 +1,7 @@
-"""Real-time renderers in flatland: chains of frames, their camera still or moving two to three pixels per frame.
+"""Real-time renderers: chains of frames, their camera still or moving two to three pixels per frame.
 
-A moving inset is the middle of a wider row: what enters at the row's ends has no neighbours beyond them and no
-history of its own, as happens at the ends of a film of 1920 pixels only.
+A moving inset of flatland is the middle of a wider row: what enters at the row's ends has no neighbours beyond them and
+no history of its own, as happens at the ends of a film of 1920 pixels only.  Crops of space follow what they show.
 """
 
 from collections import Counter
@@ -12,16 +12,16 @@ from types import MappingProxyType
 import numpy as np
 
 from figures.claims.figure import Arrays
-from figures.experiments.flatland import HYBRID, displaced, view
-from figures.experiments.rendering import Traced, estimates, film, means, path_tracing, samples_of_equal_cost
-from flatland2d import SCENES
-from flatland2d.motion import motion
+from figures.experiments import solid
+from figures.experiments.flatland import displaced
+from figures.experiments.rendering import estimates, film, means, path_tracing, samples_of_equal_cost
+from figures.experiments.views import HYBRID, Traced, in_space, motion_vectors, setting, view
 from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.transport.baselines.restir_gi import RadianceIntegrals
-from restir_ref.transport.counting import counted, rays
-from restir_ref.transport.paths import RECONNECTION, Connectability, Tracer
+from restir_ref.transport.counting import rays
+from restir_ref.transport.paths import RECONNECTION, Connectability, Sensor, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals, ReconnectionAtX2
 
 FRAMES = 20
@@ -72,11 +72,11 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 
 
 def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
-    """The last frame of a moving camera, (replicas, n), and its rays per pixel; the scene's inset unless told."""
+    """The last frame of a moving camera, (replicas, n), and its rays per pixel; as the standard sensor unless told."""
     asked = Counter[str]()
-    views = [method.integrals(view(scene, method.rule, asked, each).tracer) for each in widened(scene, sensor)]
+    views = [method.integrals(view(scene, method.rule, asked, each).tracer) for each in approach(scene, sensor)]
     *_, (images, cost) = costed(views, asked, replicas, Live(rng))
-    return {"images": inset(images), "rays": np.array(cost)}
+    return {"images": judged(scene, images), "rays": np.array(cost)}
 
 
 def still(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
@@ -97,16 +97,19 @@ def costed(views: Sequence[Traced], asked: Counter[str], replicas: int, chance: 
     return found
 
 
-def motion_vectors(of: Traced, before: Traced) -> Array:
-    """The previous pixel of every pixel, (n,); its rays are charged by `costed`."""
-    t = of.tracer
-    uncounted = counted(t.scene, Counter())
-    return motion(uncounted, t.sensor, before.tracer.sensor).source  # type: ignore[arg-type]
+def approach(scene: str, sensor: Pinhole | None = None) -> Sequence[Sensor]:
+    """The sensors of a camera that arrives at the scene's standard sensor unless told, FRAMES in all."""
+    return solid.approach(setting(scene), FRAMES) if in_space(scene) else widened(scene, sensor)
+
+
+def judged(scene: str, images: Array) -> Array:
+    """What of the images of `approach` the standard sensor sees, (..., n)."""
+    return images if in_space(scene) else inset(images)
 
 
 def widened(scene: str, sensor: Pinhole | None = None) -> list[Pinhole]:
     """The sensors of a camera that arrives at the scene's inset unless told, MARGIN pixels wider on both sides."""
-    last = sensor or SCENES[scene]().pinhole()
+    last: Pinhole = sensor or setting(scene).pinhole()
     return sideways(replace(last, n=last.n + 2 * MARGIN, first=last.first - MARGIN))
 
 

@@ -1,7 +1,7 @@
-"""Reference images of the flatland scenes: long path tracing, or a closed form, stored with their standard errors.
+"""Reference images of scenes of both worlds: long path tracing, or a closed form, with their standard errors.
 
-`make evidence` makes them, by its jobs `references` and `indirect references`.  Each carries a fingerprint of its
-scene, sensor and depth: a scene that has changed since has no reference.
+`make evidence` makes them, by its jobs `references`, `indirect references` and `space references`.  Each carries a
+fingerprint of its scene, sensor and depth: a scene that has changed since has no reference.
 """
 
 import hashlib
@@ -16,24 +16,24 @@ from numpy.typing import NDArray
 from figures.claims.errors import FigureError
 from figures.claims.figure import Arrays
 from figures.engine import store
-from flatland2d.scenes import SCENES, Setting
+from figures.experiments.views import in_space, setting, standard
 from restir_ref.transport.lobes import KINDS
+from restir_ref.transport.paths import Sensor
+from restir_ref.transport.scene import Scene
 
 PATH = Path(__file__).with_suffix(".npz")
 KEY = store.canonical({"what": "reference images of flatland", "format": 1})
 INDIRECT = "indirect"
 """Light that ReSTIR DI does not stand for: all but what comes from a light by way of x_1 alone."""
-REMEDIES = {"": "run: make evidence ARGS=references", INDIRECT: "run: make evidence ARGS=\"'indirect references'\""}
-"""How to make the references of all light, and of indirect light."""
 DIGITS = 12
 """Digits that count: sines and tangents in scenes end differently on other machines."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The image seen by `SCENES[name]().pinhole()`, (128,), one channel.
+    """The image seen by the scene's standard sensor, (n,), the mean of its channels.
 
-    error    standard error of each pixel (128,), and `image_error` that of the image's mean
+    error    standard error of each pixel (n,), and `image_error` that of the image's mean
     samples  per pixel, 0 where nothing is sampled;  how  in words
     """
 
@@ -52,14 +52,20 @@ def reference(name: str, light: str = "", path: Path = PATH) -> Reference:
     stored, key = stored_at(path), key_of(name, light)
     if f"{key}.mean" not in stored:
         raise FigureError(
-            f"{path.name} holds no reference of the scene {name!r}{light and f', {light}'}; {REMEDIES[light]}"
+            f"{path.name} holds no reference of the scene {name!r}{light and f', {light}'}; {remedy(name, light)}"
         )
-    if str(stored[f"{key}.scene"]) != fingerprint(SCENES[name]()):
-        raise FigureError(f"the scene {name!r} has changed since its reference was computed; {REMEDIES[light]}")
+    if str(stored[f"{key}.scene"]) != fingerprint(name):
+        raise FigureError(f"the scene {name!r} has changed since its reference was computed; {remedy(name, light)}")
     mean, error = stored[f"{key}.mean"], stored[f"{key}.error"]
     return Reference(
         mean, error, float(stored[f"{key}.image_error"]), int(stored[f"{key}.samples"]), str(stored[f"{key}.how"])
     )
+
+
+def remedy(name: str, light: str = "") -> str:
+    """How to make a reference."""
+    job = "space references" if in_space(name) else f"{light} references".strip()
+    return f"run: make evidence ARGS={job}" if " " not in job else f"run: make evidence ARGS=\"'{job}'\""
 
 
 def key_of(name: str, light: str = "") -> str:
@@ -72,14 +78,14 @@ def stored_at(path: Path) -> Arrays:
     found = store.load(path, KEY)
     if found.state in ("ours", "absent"):
         return found.arrays
-    raise FigureError(f"{path.name} cannot be used ({found.trouble}); restore it from git, or {REMEDIES['']}")
+    raise FigureError(f"{path.name} cannot be used ({found.trouble}); restore it from git, or {remedy('')}")
 
 
 def save(references: Mapping[str, Reference], path: Path = PATH) -> None:
     """Write references of today's scenes, by `key_of`, into the file, in one step; one that is better stays."""
     arrays = stored_at(path)
     for name, each in references.items():
-        scene = fingerprint(SCENES[name.partition(".")[0]]())
+        scene = fingerprint(name.partition(".")[0])
         stays = str(arrays.get(f"{name}.scene")) == scene and arrays[f"{name}.image_error"] < each.image_error
         if not stays:
             values: dict[str, Any] = {**vars(each), "scene": scene}
@@ -88,11 +94,17 @@ def save(references: Mapping[str, Reference], path: Path = PATH) -> None:
     store.save(path, arrays, KEY)
 
 
-def fingerprint(setting: Setting) -> str:
+def fingerprint(name: str) -> str:
+    """`digest` of the scene of that name, seen by its standard sensor."""
+    of = setting(name)
+    return digest(of.scene, standard(name), of.depth)
+
+
+def digest(scene: Scene, sensor: Sensor, depth: int) -> str:
     """SHA-256, shortened, over what the image depends on: shapes, materials, lights, sensor and depth."""
-    scene, table = setting.scene, setting.scene.materials
+    table = scene.materials
     kinds = [KINDS[kind] for kind in table.kind]
-    total = hashlib.sha256(repr((setting.pinhole(), setting.depth, kinds)).encode())
+    total = hashlib.sha256(repr((sensor, depth, kinds)).encode())
     shapes = (scene.corners, scene.centres, scene.radii, scene.material, scene.emission)
     for array in (*shapes, table.roughness, table.colour, table.weight, table.eta):
         values = np.round(np.asarray(array, dtype=float), DIGITS) + 0.0

@@ -7,17 +7,17 @@ with history.  Rays are counted by the scene, so costs do not depend on the mach
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from figures.experiments.views import Traced, at_random, evenly
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
-from restir_ref.integrals import Image, Pixels, Reservoirs
-from restir_ref.loop import OFFLINE, REAL_TIME, Around, Preset, frame, random_in_row, spread_in_row
+from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.loop import OFFLINE, REAL_TIME, Around, Preset, frame
 from restir_ref.restir import shade
 from restir_ref.transport.counting import rays
-from restir_ref.transport.paths import Tracer, Tree, radiance, trace
+from restir_ref.transport.paths import Tree, radiance, trace
 from restir_ref.transport.restir_pt import PathIntegrals
 
 COLUMNS = 2**14
@@ -31,14 +31,6 @@ Renderer = Callable[[PathIntegrals, Array, Chance], Array]
 
 Light = Callable[[Tree], Array]
 """What counts of a path tree, (C, N): `radiance`, or `indirect_light`."""
-
-
-class Traced(Image, Protocol):
-    """An image of traced paths, whatever its shifts keep."""
-
-    @property
-    def tracer(self) -> Tracer:
-        """Scene, sensor, depth and rule."""
 
 
 Sources = Callable[[Traced, Traced], Array]
@@ -75,14 +67,17 @@ def lattice_tracing(light: Light = radiance) -> Renderer:
         t, total = of.tracer, np.zeros(len(index))
         powers = np.array([pow(GENERATOR, j, POINTS) for j in range(t.D)])[:, None]
         by = chance.uniform((t.D, len(index)))
-        for k in range(POINTS):
-            total += light(trace(t, (powers * k % POINTS / POINTS + by) % 1, index % of.n)).mean(axis=0)
+        for some in np.array_split(np.arange(POINTS), -(-POINTS * len(index) // COLUMNS)):
+            points = (powers * some % POINTS / POINTS)[:, :, None] + by[:, None]
+            tree = trace(t, (points % 1).reshape(t.D, -1), np.tile(index % of.n, len(some)))
+            for found in light(tree).mean(axis=0).reshape(len(some), -1):
+                total += found
         return total / POINTS
 
     return render
 
 
-def spatial_only(preset: Preset, around: Around = spread_in_row) -> Renderer:
+def spatial_only(preset: Preset, around: Around = evenly) -> Renderer:
     """One frame of a preset without history, its neighbours from a low-discrepancy sequence unless told otherwise."""
 
     def render(of: PathIntegrals, index: Array, chance: Chance) -> Array:
@@ -125,7 +120,7 @@ def film(
             there = index % of.n if sources is None else sources(of, views[k - 1])[index % of.n]
             before = [Pixels(views[k - 1], index - index % of.n + there)]
         here = Pixels(of, index)
-        history = frame(here, chance, preset, random_in_row, history, before)
+        history = frame(here, chance, preset, at_random, history, before)
         yield np.asarray(shade(history, here).mean(axis=0).reshape(replicas, of.n))
 
 

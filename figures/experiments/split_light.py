@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from figures.claims.figure import Arrays
-from figures.experiments.flatland import HYBRID, view
-from figures.experiments.realtime import Method, inset, motion_vectors, moved, widened
-from figures.experiments.rendering import Traced, estimates, path_tracing
+from figures.experiments.realtime import Method, approach, judged, moved
+from figures.experiments.rendering import estimates, path_tracing
+from figures.experiments.views import HYBRID, Traced, at_random, motion_vectors, view
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.integrals import Pixels, Reservoirs, Shifted
-from restir_ref.loop import REAL_TIME, random_in_row
+from restir_ref.loop import REAL_TIME
 from restir_ref.resampling import Candidate, select
 from restir_ref.restir import shade
 from restir_ref.transport.baselines.restir_di import DEBIASED, direct_light, indirect_light, light_integrals
@@ -61,9 +61,9 @@ INDIRECT = Method(HYBRID, IndirectIntegrals)
 def direct(scene: str, replicas: int, rng: np.random.Generator) -> Arrays:
     """The last frame of a moving camera, direct light alone, (replicas, n)."""
     asked = Counter[str]()
-    views = [view(scene, HYBRID, asked, sensor) for sensor in widened(scene)]
+    views = [view(scene, HYBRID, asked, sensor) for sensor in approach(scene)]
     *_, images = direct_film(views, replicas, Live(rng))
-    return {"images": inset(images)}
+    return {"images": judged(scene, images)}
 
 
 def direct_film(views: Sequence[Traced], replicas: int, chance: Chance) -> Iterator[Array]:
@@ -77,7 +77,7 @@ def direct_film(views: Sequence[Traced], replicas: int, chance: Chance) -> Itera
         if last is not None:
             there = motion_vectors(of, views[k - 1])[index % of.n]
             before = [Pixels(last.of, index - index % of.n + there)]
-        near = random_in_row(of, index, REAL_TIME.neighbours, REAL_TIME.radius, chance)
+        near = at_random(of, index, REAL_TIME.neighbours, REAL_TIME.radius, chance)
         around = [Pixels(here.of, each.index) for each in near]
         history = direct_light(here, around, DEBIASED["defensive"], chance, history, before)
         last = here

@@ -13,9 +13,9 @@ import numpy as np
 
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
-from figures.experiments.flatland import HYBRID, view
 from figures.experiments.references import reference
 from figures.experiments.rendering import COLUMNS, means
+from figures.experiments.views import HYBRID, view
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live

@@ -14,10 +14,10 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import corners, offline, realtime
-from figures.experiments.flatland import HYBRID
 from figures.experiments.realtime import Method
 from figures.experiments.rendering import offline as one_frame
 from figures.experiments.split_light import IndirectIntegrals
+from figures.experiments.views import HYBRID
 from figures.report import style
 from flatland2d import SCENES
 from flatland2d.sensors import FILM, Pinhole

@@ -14,8 +14,9 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import indirect, offline, realtime
-from figures.experiments.flatland import RULES, TEN, view
+from figures.experiments.flatland import TEN
 from figures.experiments.references import INDIRECT, reference
+from figures.experiments.views import RULES, view
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Live

@@ -14,9 +14,9 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import indirect, realtime
-from figures.experiments.flatland import HYBRID, view
 from figures.experiments.rendering import lattice_tracing, path_tracing
 from figures.experiments.split_light import direct_film
+from figures.experiments.views import HYBRID, view
 from figures.report import style
 from flatland2d import SCENES, radiosity
 from flatland2d.sensors import FILM, Pinhole

@@ -208,7 +208,7 @@ FIGURE = Figure(
     source="[GRIS Fig. 2; 6.4]",
     claims=("GRIS-F02", "GRIS-C01"),
     presets={
-        "quick": {**CAPS, "frames": 1000, "chains": 600, "blocks": 2},
+        "quick": {**CAPS, "frames": 1000, "chains": 600, "blocks": 1},
         "paper": {**CAPS, "frames": 3000, "chains": 1000, "blocks": 8},
     },
     chunks=chunks,

@@ -13,7 +13,7 @@ import numpy as np
 
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
-from figures.experiments.flatland import HYBRID
+from figures.experiments.views import HYBRID
 from figures.report import style
 from flatland2d.scenes import Setting, chain, matte
 from flatland2d.shift_pictures import pair, pair_in_words, shift_picture

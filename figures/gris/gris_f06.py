@@ -12,8 +12,8 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import corners, indirect, realtime
-from figures.experiments.flatland import HYBRID
 from figures.experiments.references import INDIRECT, reference
+from figures.experiments.views import HYBRID
 from figures.report import style
 from flatland2d import SCENES
 from flatland2d.gbuffer import gbuffer

@@ -14,10 +14,10 @@ import numpy as np
 
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
-from figures.experiments.flatland import view
 from figures.experiments.references import reference
 from figures.experiments.rendering import estimates, means, spatial_only
 from figures.experiments.split_light import IndirectIntegrals
+from figures.experiments.views import view
 from figures.report import style
 from flatland2d import SCENES
 from restir_ref.batch import Array
@@ -295,7 +295,7 @@ FIGURE = Figure(
     presets={
         "quick": {
             "short": {"caps": [1, 2, 4, 5], "replicas": [12, 12, 12, 12], "frames": 200, "blocks": 1},
-            "long": {"caps": [3, 6, 7], "replicas": [12, 12, 8], "frames": 1000, "blocks": 1},
+            "long": {"caps": [3, 6, 7], "replicas": [8, 8, 8], "frames": 1000, "blocks": 1},
             "spatial": {"frames": 4000},
         },
         "paper": {

@@ -16,10 +16,10 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import corners, realtime, split_light
-from figures.experiments.flatland import HYBRID, view
 from figures.experiments.realtime import Method
 from figures.experiments.references import INDIRECT, reference
 from figures.experiments.split_light import IndirectIntegrals
+from figures.experiments.views import HYBRID, view
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Live

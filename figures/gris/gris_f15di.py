@@ -16,9 +16,9 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import realtime
-from figures.experiments.flatland import view
 from figures.experiments.references import reference
 from figures.experiments.rendering import means, samples_of_equal_cost
+from figures.experiments.views import motion_vectors, view
 from figures.report import style
 from flatland2d import SCENES
 from flatland2d.radiosity import render
@@ -92,7 +92,7 @@ def last_frame(preset: Any, mis: Weights, chance: Chance) -> tuple[Tree, Array, 
         t = paths.tracer
         of = light_integrals(t, chance.uniform((t.D, len(index))), index % n)
         history = one_frame(of, index, mis, chance, history, before)
-        before = [Pixels(of, index - index % n + realtime.motion_vectors(following, paths)[index % n])]
+        before = [Pixels(of, index - index % n + motion_vectors(following, paths)[index % n])]
     t, start = views[-1].tracer, rays(asked)
     tree = trace(t, chance.uniform((t.D, len(index))), index % n)
     traced, of = rays(asked), LightIntegrals(t.scene, n, tree.x[0], tree.T[0])

@@ -17,8 +17,9 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import offline
-from figures.experiments.flatland import TEN, view
+from figures.experiments.flatland import TEN
 from figures.experiments.rendering import means
+from figures.experiments.views import view
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Live
@@ -315,7 +316,7 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"path tracing": 1024, "path reuse": 1024, "reconnection": 96, "hybrid": 96, "shifts": 64},
+        "quick": {"path tracing": 1024, "path reuse": 512, "reconnection": 96, "hybrid": 96, "shifts": 64},
         "paper": {"path tracing": 8192, "path reuse": 8192, "reconnection": 1024, "hybrid": 1024, "shifts": 512},
     },
     chunks=chunks,

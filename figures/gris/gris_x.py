@@ -16,9 +16,9 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import offline, realtime
-from figures.experiments.flatland import HYBRID, view
 from figures.experiments.references import INDIRECT, reference
-from figures.experiments.rendering import Traced, estimates, path_tracing
+from figures.experiments.rendering import estimates, path_tracing
+from figures.experiments.views import HYBRID, Traced, view
 from figures.gris import gris_c12, gris_f17
 from figures.report import style
 from flatland2d import SCENES, radiosity

@@ -85,9 +85,9 @@ def drawn(text: "Text") -> bool:
 
 def axes(picture: "Picture") -> "list[Axes]":
     """All panels, those inside others included."""
-    from matplotlib.axes import Axes
-
-    found: list[Any] = picture.findobj(Axes)
+    found: list[Any] = list(picture.axes)
+    for each in found:  # grows by what it finds
+        found += each.child_axes
     return [each for each in found if each.get_visible()]
 
 

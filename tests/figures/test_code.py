@@ -49,7 +49,7 @@ def test_the_digest_sees_statements_but_no_comments(tmp_path, monkeypatch):
 
 MODULE = """
 from figures.experiments import offline
-from figures.experiments.flatland import view
+from figures.experiments.views import view
 
 SCALE, UNUSED = 2.0, 3.0
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from figures.experiments import offline
-from figures.experiments.flatland import HYBRID, TEN, moving, view
+from figures.experiments.flatland import TEN, moving
 from figures.experiments.realtime import MARGIN, METHODS, STEP, costed, inset, widened
 from figures.experiments.references import INDIRECT, reference
 from figures.experiments.rendering import (
@@ -19,6 +19,7 @@ from figures.experiments.rendering import (
     spatial_only,
 )
 from figures.experiments.split_light import IndirectIntegrals, direct_film, without_direct
+from figures.experiments.views import HYBRID, view
 from figures.gris import gris_f14, gris_f17
 from flatland2d import PLANE, SCENES
 from flatland2d.scenes import LAMP, chain, matte, room

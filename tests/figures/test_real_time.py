@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from figures.experiments import corners
-from figures.experiments.flatland import HYBRID, TEN, moving, view
+from figures.experiments.flatland import TEN, moving
 from figures.experiments.indirect import METHODS, darkened
 from figures.experiments.realtime import FRAMES, MARGIN, STEP, costed, sideways, widened
 from figures.experiments.rendering import film
 from figures.experiments.split_light import without_direct
+from figures.experiments.views import HYBRID, view
 from figures.gris import gris_c10, gris_c12
 from figures.gris.gris_f01 import CAUSTIC, GLOSSY, PIXELS
 from figures.gris.gris_f01 import film as film_of

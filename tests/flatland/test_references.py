@@ -10,7 +10,7 @@ from benchmarks.jobs.references import has_radiosity, moved
 from figures.claims.errors import FigureError
 from figures.experiments import references
 from figures.experiments.flatland import TEN
-from figures.experiments.references import INDIRECT, Reference, fingerprint, key_of, reference, save
+from figures.experiments.references import INDIRECT, Reference, digest, key_of, reference, save
 from flatland2d import SCENES
 from flatland2d.radiosity import render
 from flatland2d.scenes import INSET
@@ -120,7 +120,9 @@ CHANGES = {
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_changed_scene_has_no_reference_and_the_message_names_the_remedy(monkeypatch, change) -> None:
     right = SCENES["cornell"]()
-    monkeypatch.setattr(references, "SCENES", {"cornell": lambda: CHANGES[change](right)})
+    changed = CHANGES[change](right)
+    monkeypatch.setattr(references, "setting", lambda name: changed)
+    monkeypatch.setattr(references, "standard", lambda name: changed.pinhole())
     with pytest.raises(FigureError, match=r"'cornell' has changed.*make evidence ARGS=references"):
         reference("cornell")
 
@@ -128,9 +130,8 @@ def test_a_changed_scene_has_no_reference_and_the_message_names_the_remedy(monke
 def test_rounding_on_another_machine_changes_no_fingerprint() -> None:
     right = SCENES["many_lights"]()
     noise = 1 + 1e-15 * np.random.default_rng(1).choice([-1, 0, 1], right.scene.emission.shape)
-    assert fingerprint(
-        replace(right, scene=replace(right.scene, emission=right.scene.emission * noise))
-    ) == fingerprint(right)
+    noisy = replace(right.scene, emission=right.scene.emission * noise)
+    assert digest(noisy, right.pinhole(), right.depth) == digest(right.scene, right.pinhole(), right.depth)
 
 
 def some(error: float) -> Reference:
