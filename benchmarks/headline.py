@@ -113,8 +113,7 @@ class Theirs:
 
 
 def loaded(mi: ModuleType, scene: str, crop: tuple[int, int], sampler: str) -> Theirs:
-    """Compiled, warm, and silent about samples that it rounds."""
-    mi.set_log_level(mi.LogLevel.Error)
+    """Compiled and warm."""
     at = SCENES[scene]()
     found = Theirs(mi, mi.load_dict(exported(mi, at.scene, at.pinhole(SIZE, SIZE, crop), at.depth, sampler)))
     found.shot(4, 1)

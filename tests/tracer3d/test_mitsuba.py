@@ -113,7 +113,7 @@ WRONG = {
     "one bounce less": ("matte_cornell", lambda: replace(matte_cornell(), depth=3)),
     "another crop": ("matte_cornell", lambda: replace(matte_cornell(), crop=(938, 668))),
     "index of refraction": ("frosted_ball", lambda: frosted_ball(eta=1.3)),
-    "roughness of glass": ("frosted_ball", lambda: frosted_ball(roughness=0.6)),
+    "roughness of glass": ("frosted_ball", lambda: frosted_ball(roughness=0.5)),
 }
 
 

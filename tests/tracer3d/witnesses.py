@@ -25,7 +25,7 @@ BLOCKS = SIDE**2
 AT_ONCE = 2**14
 
 
-def frosted_ball(roughness: float = 0.4, eta: float = 1.5) -> Setting:
+def frosted_ball(roughness: float = 0.3, eta: float = 1.5) -> Setting:
     """The room of GlassBall3 with a ball of rough glass, the reflection slightly red, and a larger lamp."""
     glass = [Layer("rough reflection", (1.0, 0.9, 0.8), roughness), Layer("rough transmission", grey(0.9), roughness)]
     facets = [*room(0), *lamp((0.3, 0.3), (0.7, 0.7), 0.99, 8.0)]
@@ -58,22 +58,26 @@ def with_separable_smith() -> "patch[Callable[..., Array]]":
 def ours(at: Setting, points: Sequence[int], rounds: int, rng: np.random.Generator) -> Array:
     """Means of the inset's blocks by channel, (rounds, 3, BLOCKS), from so many points of a Sobol sequence in each.
 
-    Rounds are independent scramblings, so that their spread tells the error.  The first two numbers of a primary
-    sample are places in the block, not in a pixel.
+    Rounds and blocks are independent scramblings, so that the spread of rounds tells the error.
     """
     t = Tracer(at.scene, at.pinhole(), at.depth, RECONNECTION)
-    return np.stack([[of_block(t, b, n, rng) for b, n in enumerate(points)] for _ in range(rounds)]).swapaxes(1, 2)
+    places = [(block, n) for _ in range(rounds) for block, n in enumerate(points)]
+    u, pixel = (np.concatenate(each, axis=-1) for each in zip(*(in_block(t, *at, rng) for at in places), strict=True))
+    parts = (slice(k, k + AT_ONCE) for k in range(0, len(pixel), AT_ONCE))
+    L = np.concatenate([radiance(trace(t, u[:, part], pixel[part])) for part in parts], axis=1)
+    starts = np.cumsum([0, *(n for _, n in places[:-1])])
+    found = np.add.reduceat(L, starts, axis=1) / [n for _, n in places]
+    return np.asarray(found.reshape(3, rounds, BLOCKS).swapaxes(0, 1))
 
 
-def of_block(t: Tracer, block: int, n: int, rng: np.random.Generator) -> Array:
-    """The mean of one block, (3,)."""
+def in_block(t: Tracer, block: int, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Primary samples (D, n) of one block and their pixels (n,); two of Sobol's numbers are a place in the block."""
     u = qmc.Sobol(t.D, rng=rng).random(n).T.copy()
     rows, columns = (count // SIDE for count in t.sensor.shape)  # type: ignore[attr-defined]
     column, row = u[0] * columns, u[1] * rows
     u[0], u[1] = column % 1, row % 1
     pixel = (block // SIDE * rows + row.astype(int)) * SIDE * columns + block % SIDE * columns + column.astype(int)
-    parts = (slice(k, k + AT_ONCE) for k in range(0, n, AT_ONCE))
-    return np.asarray(sum(radiance(trace(t, u[:, part], pixel[part])).sum(axis=1) for part in parts) / n)
+    return u, pixel
 
 
 def theirs(mi: ModuleType, at: Setting, samples: int, rounds: int, rng: np.random.Generator) -> Array:
