@@ -5,14 +5,14 @@ What has to match, so that both estimate the same number for every pixel:
 - Paths have at most depth + 1 edges; there is no roulette; a pixel's filter is a box.
 - All surfaces but dielectrics have two sides; normals are those of the faces; lamps shine to their front.
 - GGX has alpha = roughness^2 and no Fresnel term: a rough conductor of material `none`.  Its Smith term is
-  separable there, G_1(o) G_1(i), and height-correlated here: about .1% of a picture's mean.
+  separable there, G_1(o) G_1(i), and height-correlated here: .4% of the mean of CB3's inset.
 - Sums of lobes are blends (1 - w) a + w b: the weights are divided out of the colours.
 - Radiance passes interfaces with a factor eta^2 there, basic radiance without one here.  It cancels where eye
   and lamps are outside of all solids; other scenes are refused.
 
 Floating point: Mitsuba has single precision, and starts rays 9e-5 (1 + largest coordinate) off a surface.  In a room
-of size 1 beside the origin that is .1% of GlassBall3's radius, and .3% of its caustic; so scenes are moved to the
-origin and enlarged, which leaves a quarter of it.
+of size 1 beside the origin that is .1% of the radius of GlassBall3's ball, and .3% of its caustic; so scenes are moved
+to the origin and enlarged.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -172,7 +172,7 @@ def _groups(scene: Scene) -> list[Kind]:
 
 
 def _mesh(mi: ModuleType, scene: Scene, kind: Kind, place: Place) -> Any:
-    """All facets of a kind, (corner, facet, coordinate) one after the other; no vertex normals, so those of faces."""
+    """All facets of a kind, with corners of their own; no normals of vertices, so those of faces."""
     which = [k for k, each in enumerate(_kinds(scene)) if each == kind]
     corners = place(scene.corners[:, :, which].transpose(2, 0, 1).reshape(-1, 3))
     bsdf, emission = kind
