@@ -40,15 +40,14 @@ REQUIRED: Mapping[str, Mapping[str, float]] = {"ajar": {"MAPE": 0.6, "RMSE": 0.7
 
 FRAMES, ROUNDS, REFERENCE = 4, 8, 512
 """Frames that are averaged; rounds of a reference, from whose spread its variance is known, and paths of each."""
-MANY = 512
-"""Paths per pixel that Mitsuba traces at once."""
+MANY, TRIES = 1024, 3
+"""Paths per pixel that Mitsuba traces at once, and attempts to meet a time; the first is a small one."""
 LEAST_LLVM = 17
 
 
 def crops(scene: str) -> list[tuple[int, int]]:
     """Column and row of the film where each crop begins."""
-    (left, right), (top, bottom) = (((k * size // 3) - SIZE // 2 for k in (1, 2)) for size in FILM)
-    return [SCENES[scene]().crop, (left, top), (right, top), (left, bottom), (right, bottom)]
+    return [SCENES[scene]().crop, *product(*([k * size // 3 - SIZE // 2 for k in (1, 2)] for size in FILM))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +126,18 @@ def reference(of: Theirs, samples: int) -> Reference:
 
 
 def in_time(of: Theirs, seconds: float) -> Shot:
-    """The mean of shots of at most MANY paths that take as long together, to within a path per pixel."""
-    rate = of.shot(64, 2).seconds / 64
-    samples = max(1, round(seconds / rate))
+    """The mean of as many paths as take that long: the nearest of TRIES, each as large as the last one's rate says."""
+    samples, shots = 64, []
+    for k in range(TRIES):
+        shots.append(many(of, samples, 100 * (k + 1)))
+        samples = max(1, round(samples * seconds / shots[-1].seconds))
+    return min(shots, key=lambda shot: abs(shot.seconds - seconds))
+
+
+def many(of: Theirs, samples: int, seed: int) -> Shot:
+    """The mean of shots of at most MANY paths."""
     parts = [MANY] * (samples // MANY) + [samples % MANY] * (samples % MANY > 0)
-    shots = [of.shot(part, 100 + k) for k, part in enumerate(parts)]
+    shots = [of.shot(part, seed + k) for k, part in enumerate(parts)]
     image = sum(part * shot.image for part, shot in zip(parts, shots, strict=True)) / samples
     return Shot(np.asarray(image), sum(shot.seconds for shot in shots))
 
