@@ -1,9 +1,9 @@
 """An outside witness: Mitsuba 3 renders the same scenes, and lobes, rays and pictures agree.
 
 Pictures are compared with means of blocks that Mitsuba has found (`make evidence ARGS=witness`), so that these laws
-need no Mitsuba; where it is installed, the scenes that are exported today must give the same means.  Standard errors
-are at most a third of what is allowed: with 6 scenes of 4 means and 16 blocks, chance passes the limits less than once
-in a thousand runs, for only the noisiest blocks are near their limit.
+need no Mitsuba; where it is installed, the scenes that are exported today must give the same means.  The standard
+error of an image is at most a third of what is allowed, that of the noisiest block two fifths; who is convicted is
+beyond the limit by 5 standard errors of nothing.
 """
 
 import sys
@@ -18,6 +18,7 @@ from restir_ref.transport.materials import Layer, Material, Vertex, evaluate_eac
 from restir_ref.transport.scene import Ball, Scene, scene
 from tests.checkout import ROOT
 from tests.tracer3d.witnesses import (
+    BLOCKS,
     WITNESSED,
     Difference,
     Limits,
@@ -49,16 +50,18 @@ from tracer3d.shapes import lamp, room
 from tracer3d.space import SOLID
 from tracer3d.witness import exported, material, mitsuba, rendered
 
-LIMITS = Limits(image=0.02, block=0.05, block_error=0.05 / 3)
+LIMITS = Limits(image=0.02, block=0.05, block_error=0.02)
 POINTS = {
-    "cornell": 2**10,
+    "cornell": 2**9,
     "glossy_cornell": 2**11,
-    "matte_cornell": 2**8,
+    "matte_cornell": 2**7,
     "glass_ball": 2**9,
     "ajar": 2**13,
     "frosted_ball": 2**11,
 }
-"""Per round, in the noisiest block."""
+"""Of a block and round: as many as the standard errors take."""
+UNEVEN = ("ajar",)
+"""Where noise differs so much from block to block that the points follow it; others gain more by an even sequence."""
 ROUNDS = 16
 
 
@@ -77,11 +80,11 @@ def found(name: str) -> Means:
         return Means(**{part: arrays[f"{name}.{part}"] for part in Means.__dataclass_fields__})
 
 
-def compared(at: Setting, name: str, points: int) -> Difference:
-    """Ours of a setting over Mitsuba's of the scene of that name."""
+def compared(at: Setting, name: str, most: int) -> Difference:
+    """Ours of a setting, from at most so many points of a block and round, over Mitsuba's of the scene of that name."""
     truth = found(name)
-    spread = spread_out(points, truth.block_error / truth.block)
-    return difference(means(ours(at, spread, ROUNDS, np.random.default_rng(1))), truth)
+    points = spread_out(most, truth.block_error / truth.block) if name in UNEVEN else [most] * BLOCKS
+    return difference(means(ours(at, points, ROUNDS, np.random.default_rng(1))), truth)
 
 
 @pytest.mark.claims("COM-B01", part="Mitsuba", world="tracer3d")
@@ -119,7 +122,7 @@ WRONG = {
 
 @pytest.mark.parametrize(("name", "wrong"), WRONG.values(), ids=WRONG)
 def test_a_scene_with_one_wrong_thing_is_convicted(name, wrong):
-    d = compared(wrong(), name, 2**9)
+    d = compared(wrong(), name, 2**7)
     assert convicted(d, LIMITS), str(d)
 
 
