@@ -9,11 +9,13 @@ import numpy as np
 
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
-from restir_ref.guards import named, whole
+from restir_ref.guards import whole
 from restir_ref.transport.paths import Tracer
 from restir_ref.transport.scene import Scene
 from tracer3d.methods import METHODS, PRESETS, Shot
-from tracer3d.scenes import Setting, setting
+from tracer3d.names import known
+from tracer3d.scene_files import digest, opened
+from tracer3d.scenes import Setting
 from tracer3d.sensors import Pinhole
 
 BYTES: Mapping[str, int] = MappingProxyType({"realtime": 12_000, "offline": 18_000})
@@ -30,6 +32,7 @@ Chances = Callable[[int], Chance]
 class Job:
     """What is asked for; whatever changes the picture but the number of frames.
 
+    scene  a name, or a file whose name ends in .toml;  content  the file's digest, by which a change of it is noticed
     size   columns and rows;  crop  column and row of the film at which they begin, None for all of the view
     moving  steps of the camera per frame: a picture of a moving camera is its last frame, of a still one the mean
     Raises ValueError for unknown names, a crop off the film, and pictures that need too much memory.
@@ -43,10 +46,13 @@ class Job:
     moving: float = 0.0
     depth: int | None = None
     seed: int = 1
+    content: str | None = None
 
     def __post_init__(self) -> None:
-        named(METHODS, self.method, "method")
-        named(PRESETS, self.preset, "preset")
+        if self.content is None:
+            object.__setattr__(self, "content", digest(self.scene))
+        known(METHODS, self.method, "method")
+        known(PRESETS, self.preset, "preset")
         for count in self.size:
             whole(count, 1, "each side of a picture", "Say --size 64x64.")
         needed = self.size[0] * self.size[1] * BYTES[self.preset]
@@ -61,7 +67,7 @@ class Job:
 
     def setting(self, frame: float) -> Setting:
         """The scene as the camera of a frame sees it."""
-        at, steps = _begun(self.scene, self.depth), frame * self.moving
+        at, steps = _begun(self.scene, self.content, self.depth), frame * self.moving
         return at.at(steps) if steps else at
 
     def sensor(self, frame: float) -> Pinhole:
@@ -75,8 +81,8 @@ class Job:
 
 
 @cache
-def _begun(scene: str, depth: int | None) -> Setting:
-    at = setting(scene)
+def _begun(scene: str, content: str | None, depth: int | None) -> Setting:
+    at = opened(scene, content).setting
     return at if depth is None else replace(at, depth=depth)
 
 
