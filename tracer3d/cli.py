@@ -189,11 +189,18 @@ def _path_traced(job: Job, trees: int) -> Array:
 
 
 def _side_by_side(job: Job, methods: Sequence[str], budget: compare.Budget, R: Array, out: Path) -> int:
-    rows = compare.compared(job, methods, budget, _chances(job.seed))
+    """Compare, and keep what there is, whatever ends it."""
+    rows: list[compare.Row] = []
+    try:
+        rows += compare.compared(job, methods, budget, _chances(job.seed))
+    except KeyboardInterrupt:
+        if not rows:
+            raise
     print(compare.table(rows, R))
     compare.sheet(out.with_suffix(".png"), rows, R)
-    print(f"pictures and errors in {out.with_suffix('.png')}")
-    return 0
+    left = ",".join(methods[len(rows) :])
+    print(f"pictures and errors in {out.with_suffix('.png')}" + (f"; to go on, say --methods {left}" if left else ""))
+    return STOPPED if left else 0
 
 
 def _list(options: argparse.Namespace) -> Callable[[], int]:
@@ -206,10 +213,10 @@ def _list(options: argparse.Namespace) -> Callable[[], int]:
         print("scenes:")
         for name, each in found.items():
             _noted(each)
-            print(f"  {name:24}{each.title}" + (f"\n{_described(each)}" if options.scenes else ""))
+            print(f"  {name:23} {each.title}" + (f"\n{_described(each)}" if options.scenes else ""))
         print("methods:")
         for name, method in METHODS.items():
-            print(f"  {name:24}{method.words}")
+            print(f"  {name:23} {method.words}")
         return 0 if options.out is None else _thumbnails(names, options.out)
 
     return work

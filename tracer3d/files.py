@@ -161,7 +161,7 @@ def load(out: Path, job: Job) -> Picture | None:
     if not path.exists():
         return None
     try:
-        with np.load(path, allow_pickle=False) as state:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as state:
             was, picture = json.loads(str(state["job"])), Picture(state["sum"], int(state["frames"]))
     except (ValueError, KeyError, EOFError, TypeError, BadZipFile) as error:
         raise ValueError(f"{path} is not what a run has left, or is damaged: say another --out, or --anew.") from error

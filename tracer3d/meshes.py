@@ -18,7 +18,7 @@ import numpy as np
 from restir_ref.batch import Array
 from tracer3d.names import known
 from tracer3d.sensors import Point
-from tracer3d.tables import LARGEST
+from tracer3d.tables import LARGEST, SMALLEST
 
 FLAT, SPECK = 1e-9, 1e-15
 """Twice the area of a triangle over its longest side squared, and that side, below which it has none."""
@@ -39,6 +39,7 @@ def placed(corners: Array, at: Placement) -> Array:
     S = at.units * np.diag(at.scale)
     x, y, z = (_turn(axis, degrees) for axis, degrees in enumerate(at.rotate))
     moved = corners @ (z @ y @ x @ S).T + at.translate
+    moved = np.where(np.abs(moved) > SMALLEST, moved, 0.0)
     return moved[:, ::-1] if np.prod(np.sign(at.scale)) < 0 else moved
 
 
@@ -91,7 +92,7 @@ def _by_trimesh(data: bytes, kind: str) -> tuple[Array, Array]:
             vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
     except Exception as error:  # of any kind: trimesh meets damage where it happens to
         raise ValueError(f"trimesh cannot read it ({type(error).__name__}: {str(error)[:120]}).") from error
-    return vertices.reshape(len(vertices), -1)[:, :3], faces.reshape(-1, 3)
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from tracer3d.names import known
 MUST = object()
 """In place of a value for a key that has to be there."""
 
-LARGEST = 1e9
-"""No number of a file is larger, so that squares and their products stay finite."""
+LARGEST, SMALLEST = 1e9, 1e-30
+"""No number of a file is larger, and smaller ones are 0, so that products of some of them are numbers."""
 
 SHORT = Repr()
 SHORT.maxstring = SHORT.maxother = SHORT.maxlong = 60
@@ -108,7 +108,7 @@ def _number(value: Any, low: float, high: float) -> float:
     x = float(value)
     if not low <= x <= high:
         raise ValueError
-    return x
+    return x if abs(x) > SMALLEST else 0.0
 
 
 def _whole(value: Any, low: int, high: int) -> int:
