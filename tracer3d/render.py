@@ -21,6 +21,12 @@ from tracer3d.sensors import Pinhole
 BYTES: Mapping[str, int] = MappingProxyType({"realtime": 12_000, "offline": 18_000})
 """Memory per pixel of methods that hold a whole frame, by preset: the most that was measured on `cornell`."""
 
+TRACED = 200
+"""The same for path tracing, which holds some images only."""
+
+RAY, BESIDE = 3e-8, 30
+"""Seconds for asking one surface for one ray, and how many surfaces all else costs as much as; 34 to 5000 measured."""
+
 MOST = 4 * 2**30
 """Bytes that a picture may need."""
 
@@ -55,11 +61,12 @@ class Job:
         known(PRESETS, self.preset, "preset")
         for count in self.size:
             whole(count, 1, "each side of a picture", "Say --size 64x64.")
-        needed = self.size[0] * self.size[1] * BYTES[self.preset]
-        if self.method != "path" and needed > MOST:
+        needed = self.size[0] * self.size[1] * (TRACED if self.method == "path" else BYTES[self.preset])
+        if needed > MOST:
             raise ValueError(
                 f"a picture of {self.size[0]} x {self.size[1]} pixels by {self.method} needs about "
-                f"{needed / 2**30:.1f} GiB, more than {MOST / 2**30:.0f}: render a smaller one, a crop, or by path."
+                f"{needed / 2**30:.1f} GiB, more than {MOST / 2**30:.0f}, and {self.hours():.1f} hours a frame: "
+                f"render a smaller one, or a crop{'' if self.method == 'path' else ', or by path'}."
             )
         if self.method == "path-reuse" and any(count % 4 for count in self.size):
             raise ValueError(f"path reuse needs sides that are multiples of 4, but the size is {self.size}.")
@@ -69,6 +76,12 @@ class Job:
         """The scene as the camera of a frame sees it."""
         at, steps = _begun(self.scene, self.content, self.depth), frame * self.moving
         return at.at(steps) if steps else at
+
+    def hours(self) -> float:
+        """About the time that path tracing of a frame takes: two rays per vertex, each of which asks every surface."""
+        at = self.setting(0)
+        rays = self.size[0] * self.size[1] * PRESETS[self.preset].trees * 2 * at.depth
+        return rays * (len(at.scene.material) + BESIDE) * RAY / 3600
 
     def sensor(self, frame: float) -> Pinhole:
         """The camera of a frame."""

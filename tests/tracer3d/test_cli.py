@@ -103,7 +103,11 @@ MISTAKES = {
     "an unknown preset": (["crease", "--preset", "fast"], "no preset 'fast': there are realtime, offline."),
     "a crop off the film": (["crease", "--crop", "1900,0"], "begins at 1900 and has 64"),
     "a size of nothing": (["crease", "--size", "0x4"], "is 0. Say --size 64x64."),
-    "an absurd size": (["crease", "--size", "20000x20000"], "needs about 4470.3 GiB, more than 4"),
+    "an absurd size": (
+        ["crease", "--size", "20000x20000"],
+        "needs about 4470.3 GiB, more than 4, and 1.2 hours a frame",
+    ),
+    "an absurd size by path": (["crease", "--method", "path", "--size", "20000x20000"], "about 74.5 GiB, more than 4"),
     "a depth of 0": (["crease", "--depth", "0"], "the path depth must be a whole number >= 1, but is 0"),
     "tiles that do not fill it": (["crease", "--method", "path-reuse", "--size", "10x8"], "multiples of 4"),
     "a missing reference": (["crease", "--reference", "nowhere.pfm"], "nowhere.pfm"),
