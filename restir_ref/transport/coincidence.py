@@ -7,6 +7,7 @@ ones of the list farther, lamps farthest.  So a lamp in a wall shines, and from 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -52,18 +53,34 @@ def coincident(corners: Array, maps: Array, offsets: Array, least: float) -> Arr
         in_b, off_b = _seen_from(maps, offsets, b, corners[a], least)
         found.append(np.stack([a, b])[:, (in_a | in_b) & ~off_a & ~off_b])
     pairs = np.concatenate(found, axis=1)
+    pairs = pairs[:, np.lexsort(pairs[::-1])]
     return np.concatenate([pairs, pairs[::-1]], axis=1)
 
 
 def _boxes_that_meet(corners: Array, least: float) -> Iterator[tuple[Array, Array]]:
-    """Facets a < b, (P,) each, whose boxes along the axes are nowhere farther apart than `least`."""
+    """Facets a < b, (P,) each, whose boxes along the axes are nowhere farther apart than `least`.
+
+    In the order in which they begin along an axis, a box overlaps those that begin before it ends: of these few, along
+    the axis that makes them fewest, the other axes are compared.
+    """
     low, high = (corners.min(axis=1) - least).T, corners.max(axis=1).T
-    step = max(AT_ONCE // len(corners), 1)
-    for at in range(0, len(corners), step):
-        part = slice(at, at + step)
-        meet = [(l[:, None] <= h[part]) & (h[:, None] >= l[part]) for l, h in zip(low, high, strict=True)]
-        a, b = np.nonzero(np.logical_and.reduce(meet))
-        yield a[a < b + at], (b + at)[a < b + at]
+    order, count = min(map(_overlaps, low, high), key=lambda found: int(found[1].sum()))
+    low, high, upto = low[:, order], high[:, order], np.cumsum(count)
+    cuts = np.searchsorted(upto, np.arange(0, upto[-1], AT_ONCE), side="right")
+    for at, end in pairwise(np.unique([*cuts, len(order)])):
+        n = count[at:end]
+        first = np.repeat(np.arange(at, end), n)
+        second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(n) - n, n)
+        meet = [(l[first] <= h[second]) & (h[first] >= l[second]) for l, h in zip(low, high, strict=True)]
+        found = np.stack([first, second])[:, np.logical_and.reduce(meet)]
+        a, b = np.sort(order[found], axis=0)
+        yield a, b
+
+
+def _overlaps(low: Array, high: Array) -> tuple[Array, Array]:
+    """The order of intervals (S,) by where they begin, and how many of those behind in it each of them overlaps."""
+    order = np.argsort(low, kind="stable")
+    return order, np.searchsorted(low[order], high[order], side="right") - np.arange(1, len(order) + 1)
 
 
 def _seen_from(maps: Array, offsets: Array, a: Array, v: Array, least: float) -> tuple[Array, Array]:

@@ -279,7 +279,9 @@ def test_a_mesh_that_cannot_be_used_is_named_with_its_place(tmp_path, mesh, more
 def test_a_mesh_of_absurd_size_is_refused_with_the_time_it_would_take(tmp_path, monkeypatch):
     monkeypatch.setattr(scene_files, "MOST", 8)
     path = written(tmp_path, ROOM + MESH)
-    with pytest.raises(ValueError, match=r"number 1: with it the scene has 9 triangles, more than 8.* 0.0 hours"):
+    with pytest.raises(
+        ValueError, match=r"number 1: with it the scene has 9 triangles, more than 8.* 0.0 minutes and 0.0 GiB"
+    ):
         read(path)
     monkeypatch.setattr(scene_files, "MOST", 9)
     assert read(path).setting.scene.S == 9
