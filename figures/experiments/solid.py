@@ -33,6 +33,27 @@ SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
 )
 
 
+WIDE = 48
+"""Columns and rows of an inset."""
+
+INSETS: Mapping[str, tuple[str, tuple[int, int]]] = MappingProxyType(
+    {
+        "CB3, box": ("CB3", (960, 700)),
+        "CB3-glossy, box": ("CB3-glossy", (960, 700)),
+        "CB3-glossy, foot": ("CB3-glossy", (1076, 1022)),
+    }
+)
+"""Scenes seen through an inset of their own, with the film's pixel in its middle: the low box's upright edge, with the
+tall one behind it; and its foot in front, where it stands on the floor.
+"""
+
+
+def inset(name: str, wide: int = WIDE) -> Mosaic:
+    """One of the insets, square."""
+    scene, (x, y) = INSETS[name]
+    return Mosaic(SCENES[scene]().pinhole(wide, wide), ((x - wide // 2, y - wide // 2),))
+
+
 def crops(setting: Setting) -> Mosaic:
     """COUNT crops at places of the R2 sequence, in the middle half of the film's columns, on all of its rows."""
     at = (0.5 + np.outer(np.arange(1, COUNT + 1), GENERATORS)) % 1
