@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from inspect import getdoc
 from pathlib import Path
 from types import MappingProxyType
@@ -71,7 +71,8 @@ def digest(name: str) -> str | None:
     for row in rows if isinstance(rows, list) else []:
         file = row.get("file") if isinstance(row, dict) else None
         if isinstance(file, str) and file.isprintable() and (path.parent / file).is_file():
-            found.update((path.parent / file).read_bytes())
+            with (path.parent / file).open("rb") as mesh:
+                found.update(file_digest(mesh, "sha256").digest())
     return found.hexdigest()[:16]
 
 

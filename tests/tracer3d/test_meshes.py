@@ -208,6 +208,14 @@ def test_damage_is_told(tmp_path, suffix, data, said):
     assert said in str(refused.value)
 
 
+def test_a_file_of_absurd_size_is_refused_unread_with_the_estimate(tmp_path):
+    path = tmp_path / "big.obj"
+    with path.open("wb") as file:
+        file.truncate(2**30)  # a hole, which takes no room
+    with pytest.raises(ValueError, match=r"1024 MiB, more than 100: .* 8.9 minutes and 24.0 GiB. Simplify the mesh"):
+        load(path)
+
+
 def test_a_file_that_is_not_there_is_an_error_of_the_system():
     with pytest.raises(FileNotFoundError, match=r"nowhere.obj"):
         load(Path("nowhere.obj"))
