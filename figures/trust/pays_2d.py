@@ -97,6 +97,8 @@ def pictured(a: Arrays, scenes: Sequence[str], radii: Sequence[int], tile: Calla
 
 def ratios(axis: "Axes", a: Arrays, scene: str, radii: Sequence[int]) -> None:
     """Variance after reuse over that without, predicted as a line, measured as marks; by radius."""
+    from matplotlib.ticker import LogLocator  # noqa: PLC0415  (drawing only)
+
     M = np.geomspace(TREES[0], TREES[-1], 50)
     for k, radius in enumerate(radii):
         s, name = of(a, scene, radius), f"{scene}.{radius}"
@@ -110,6 +112,9 @@ def ratios(axis: "Axes", a: Arrays, scene: str, radii: Sequence[int]) -> None:
     axis.axhline(1, color=style.INK, lw=1, ls="-", marker="", label="no gain, no loss")
     axis.set_xticks([], minor=True)
     axis.set_xticks(TREES, [str(M) for M in TREES])
+    axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_formatter("")
     axis.set(xlabel="trees per pixel $M$", ylabel="variance with / without reuse", title=scene)
     style.below(axis, ncols=1)
 
