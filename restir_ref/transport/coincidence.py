@@ -15,7 +15,7 @@ from restir_ref.batch import Array, take, total
 from restir_ref.transport.vectors import dot
 
 AT_ONCE = 2**18
-"""Pairs of facets whose boxes are compared at once."""
+"""Pairs of facets whose boxes are compared at once, or those of one facet if these are more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,27 +60,25 @@ def coincident(corners: Array, maps: Array, offsets: Array, least: float) -> Arr
 def _boxes_that_meet(corners: Array, least: float) -> Iterator[tuple[Array, Array]]:
     """Facets a < b, (P,) each, whose boxes along the axes are nowhere farther apart than `least`.
 
-    In the order in which they begin along an axis, a box overlaps those that begin before it ends: of these few, along
-    the axis that makes them fewest, the other axes are compared.
+    Sorted along the axis that separates most of them, box i meets boxes i + 1 .. until one begins where it has ended.
     """
     low, high = (corners.min(axis=1) - least).T, corners.max(axis=1).T
-    order, count = min(map(_overlaps, low, high), key=lambda found: int(found[1].sum()))
-    low, high, upto = low[:, order], high[:, order], np.cumsum(count)
-    cuts = np.searchsorted(upto, np.arange(0, upto[-1], AT_ONCE), side="right")
-    for at, end in pairwise(np.unique([*cuts, len(order)])):
-        n = count[at:end]
-        first = np.repeat(np.arange(at, end), n)
-        second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(n) - n, n)
-        meet = [(l[first] <= h[second]) & (h[first] >= l[second]) for l, h in zip(low, high, strict=True)]
-        found = np.stack([first, second])[:, np.logical_and.reduce(meet)]
-        a, b = np.sort(order[found], axis=0)
-        yield a, b
+    order, far = min((_until(*ends) for ends in zip(low, high, strict=True)), key=lambda found: int(found[1].sum()))
+    low, high, upto = low[:, order], high[:, order], np.cumsum(far)
+    cuts = np.searchsorted(upto, np.arange(AT_ONCE, upto[-1] + AT_ONCE, AT_ONCE)) + 1
+    for start, stop in pairwise([0, *np.unique(np.minimum(cuts, len(order))).tolist()]):
+        i = np.arange(start, stop).repeat(far[start:stop])
+        j = i + 1 + np.arange(len(i)) - (upto - far)[i] + (upto - far)[start]
+        for l, h in zip(low, high, strict=True):
+            meet = (l[i] <= h[j]) & (h[i] >= l[j])
+            i, j = i[meet], j[meet]
+        yield np.minimum(order[i], order[j]), np.maximum(order[i], order[j])
 
 
-def _overlaps(low: Array, high: Array) -> tuple[Array, Array]:
-    """The order of intervals (S,) by where they begin, and how many of those behind in it each of them overlaps."""
+def _until(low: Array, high: Array) -> tuple[Array, Array]:
+    """Intervals in the order in which they begin, and how many of the next ones begin before each has ended; (S,)."""
     order = np.argsort(low, kind="stable")
-    return order, np.searchsorted(low[order], high[order], side="right") - np.arange(1, len(order) + 1)
+    return order, np.searchsorted(low[order], high[order], side="right") - np.arange(1, len(low) + 1)
 
 
 def _seen_from(maps: Array, offsets: Array, a: Array, v: Array, least: float) -> tuple[Array, Array]:

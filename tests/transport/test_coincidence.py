@@ -323,8 +323,6 @@ def test_boxes_that_meet_are_those_of_comparing_all(space, n, at_once, monkeypat
 
 
 def test_a_sweep_that_ends_too_early_is_noticed(monkeypatch):
-    right = coincidence._overlaps
-    monkeypatch.setattr(
-        coincidence, "_overlaps", lambda *given: (right(*given)[0], np.maximum(right(*given)[1] - 1, 0))
-    )
+    right = coincidence._until
+    monkeypatch.setattr(coincidence, "_until", lambda *given: (right(*given)[0], np.maximum(right(*given)[1] - 1, 0)))
     assert missing(in_a_lattice(3, 80), 1e-9)
