@@ -180,6 +180,8 @@ DAMAGE = {
     "far too large": (".obj", "v 1e30 0 0\n" + V + "f 1 2 3", "vertex 1 is [1e+30, 0.0, 0.0]; up to 1e+09"),
     "no PLY at all": (".ply", "hello", "its header has no end"),
     "a PLY without faces": (".ply", HEADER.format("ascii", 3, 0) + P, "names no vertices, or no faces"),
+    "a PLY without vertices": (".ply", HEADER.format("ascii", 0, 1) + "3 0 1 2", "names no vertices, or no faces"),
+    "a word in a PLY": (".ply", HEADER.format("ascii", 3, 1) + P + "3 0 x 2", "face 1 must be a count >= 3"),
     "text without a row": (".ply", HEADER.format("ascii", 3, 2) + P + "3 0 1 2\n", "promises 5 rows, but 4 follow"),
     "a promise of too much": (".ply", HEADER.format("ascii", 3, 10**12) + P, "promises 1000000000003 rows, but 19 by"),
     "a row cut off": (".ply", HEADER.format("ascii", 3, 1) + P + "3 0 1", "face 1 must be a count >= 3"),
@@ -206,6 +208,11 @@ def test_damage_is_told(tmp_path, suffix, data, said):
     with pytest.raises(ValueError) as refused:  # noqa: PT011
         loaded(tmp_path, suffix, data if isinstance(data, bytes) else data.encode())
     assert said in str(refused.value)
+
+
+def test_the_largest_number_of_a_file_can_be_read(tmp_path):
+    corners = loaded(tmp_path, ".obj", b"v 1e9 0 0\nv -1e9 0 0\nv 0 1e9 0\nf 1 2 3")
+    assert np.abs(corners).max() == 1e9
 
 
 def test_a_file_of_absurd_size_is_refused_unread_with_the_estimate(tmp_path):
