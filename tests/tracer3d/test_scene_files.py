@@ -129,6 +129,21 @@ def test_a_camera_slides_as_its_file_says(tmp_path):
     assert moved[:, 0] == pytest.approx([-7, -3], abs=1e-6)
 
 
+def test_a_rectangle_is_two_triangles_with_its_corners_round_its_front(tmp_path):
+    s = read(written(tmp_path, ROOM)).setting.scene
+    floor = np.moveaxis(s.corners, -1, 0)[1:3]
+    assert {tuple(corner) for corner in floor.reshape(-1, 3)} == {(0, 0, 1), (1, 0, 1), (1, 0, 0), (0, 0, 0)}
+    assert s.normals[:, 1:3].T.tolist() == [[0, 1, 0]] * 2
+    moved = read(written(tmp_path, ROOM.replace("[[0, 0, 1], [1, 0, 1]", "[[0.1, 0, 1], [1.1, 0, 1]"))).setting.scene
+    assert np.moveaxis(moved.corners, -1, 0)[1].tolist() == [[0.1, 0, 1], [1.1, 0, 1], [1, 0, 0]]
+
+
+def test_a_black_material_is_one(tmp_path):
+    s = read(written(tmp_path, ROOM.replace("colour = 0.5 }]", "colour = 0 }]"))).setting.scene
+    assert s.materials.colour[:, 0].tolist() == [0, 0, 0]
+    assert s.materials.weight[:, 0].tolist() == [1, 0]
+
+
 @needs_trimesh
 def test_a_mesh_stands_where_it_is_put_and_shines_if_told(tmp_path):
     text = ROOM + MESH + "rotate = [0, 0, 90]\ntranslate = [0.5, 0.6, 0.5]\nemission = [1, 2, 3]\n"
@@ -208,6 +223,7 @@ MISTAKES = {
     "two lines of title": ("depth", 'title = "a\\nb"\ndepth', "title must be words in quotes, on one line, but is"),
     "an odd file of a mesh": ("[[light]]", MESH.replace("a.obj", "a.stl") + "[[light]]", "there is no mesh format '"),
     "a missing mesh": ("[[light]]", MESH.replace("a.", "b.") + "[[light]]", "b.obj cannot be read: No such file"),
+    "a number for a file": ("[[light]]", MESH.replace('"a.obj"', "3") + "[[light]]", "[[mesh]] number 1: file must be"),
     "a scale of 0": ("[[light]]", MESH + "scale = [1, 0, 1]\n[[light]]", "[[mesh]] number 1: scale must be a number o"),
 }  # fmt: skip
 
