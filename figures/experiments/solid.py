@@ -15,7 +15,7 @@ from tracer3d import scenes
 from tracer3d.scenes import Setting
 from tracer3d.sensors import FILM, Mosaic, Pinhole
 
-SIDE, COUNT = 32, 5
+SIDE, COUNT = 24, 5
 """Columns and rows of a crop, and how many there are."""
 
 GENERATORS = 0.7548776662466927, 0.5698402909980532
@@ -33,7 +33,7 @@ SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
 )
 
 
-WIDE = 48
+WIDE = 36
 """Columns and rows of an inset."""
 
 INSETS: Mapping[str, tuple[str, tuple[int, int]]] = MappingProxyType(

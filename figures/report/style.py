@@ -205,7 +205,7 @@ def strips(axis: "Axes", rows: Sequence[Any], names: Sequence[str], high: float,
     axis.grid(visible=False)
 
 
-def crops(axis: "Axes", images: "Mapping[str, NDArray[Any]]", *, side: int = 32, title: str = "") -> None:
+def crops(axis: "Axes", images: "Mapping[str, NDArray[Any]]", *, side: int = 24, title: str = "") -> None:
     """Images (n,) of square crops by their names, the first one the reference, of whose pixels the scale is made."""
     reference = next(iter(images.values()))
     high = float(np.quantile(reference, 0.99)) * 1.3
