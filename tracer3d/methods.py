@@ -20,6 +20,7 @@ from restir_ref.transport.baselines.restir_di import DEBIASED, direct_light, ind
 from restir_ref.transport.baselines.restir_gi import RadianceIntegrals
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Tracer, radiance, trace
 from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.windows import over_windows, windowed
 from tracer3d.motion import motion, sources
 
 HYBRID = Connectability(0.2, 0.02)
@@ -30,6 +31,9 @@ PRESETS: Mapping[str, Preset] = MappingProxyType({"realtime": REAL_TIME, "offlin
 BLOCK, SIDE = 2**14, 4
 """Paths traced at once, and pixels along a tile of path reuse."""
 
+WINDOW = 2**12
+"""Columns that a pass looks at together: what memory a frame takes beside its reservoirs, and never what it gives."""
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -37,6 +41,7 @@ class Shot:
 
     tracer: Tracer
     chance: Chance
+    window: int = WINDOW
 
     @property
     def pixels(self) -> Array:
@@ -86,7 +91,7 @@ def resampled(make: Callable[[Tracer], Integrals]) -> Frames:
         remembered: Memory | None = None
         for shot in shots:
             here, (history, before) = Pixels(make(shot.tracer), shot.pixels), recalled(remembered, shot)
-            X = frame(here, shot.chance, preset, around(preset)(shape), history, before)
+            X = frame(here, shot.chance, preset, around(preset)(shape), history, before, windowed(shot.window))
             yield shade(X, here)
             remembered = kept(preset, shot, here, X)
 
