@@ -70,13 +70,14 @@ def windowed(size: int) -> Passes:
     return Passes(first, temporal, spatial)
 
 
-def over_windows(work: Callable[[slice, Chance], Batch], n: int, chance: Chance, size: int) -> Batch:
+def over_windows(work: Callable[[slice, Chance], Batch], n: int, chance: Chance, size: int, step: int = 1) -> Batch:
     """work(slice(0, n), chance), a batch of n columns, from windows of it; the generator ends up where it would.
 
+    Windows begin at multiples of `step`: for columns that do know of each other, such as those of a tile.
     Raises TypeError for a chance that is not `Live`, ValueError for windows that draw unlike numbers of rows, or rows
     of another width than their own.
     """
-    parts = list(windows(n, size))
+    parts = list(windows(n, size, step))
     if len(parts) == 1:
         return work(parts[0], chance)
     if not (isinstance(chance, Live) and isinstance(chance.rng, np.random.Generator)):
@@ -96,10 +97,11 @@ def over_windows(work: Callable[[slice, Chance], Batch], n: int, chance: Chance,
     return found
 
 
-def windows(n: int, size: int) -> Iterator[slice]:
+def windows(n: int, size: int, step: int = 1) -> Iterator[slice]:
     """Slices of n columns, `size` wide or a little more: one if there are less than twice as many."""
-    parts = max(n // size, 1)
-    yield from (slice(*ends) for ends in pairwise([n * k // parts for k in range(parts + 1)]))
+    parts = max(n // max(size, step), 1)
+    cuts = [n // step * k // parts * step for k in range(parts)]
+    yield from (slice(*ends) for ends in pairwise([*cuts, n]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType({"realtime": REAL_TIME, "offlin
 BLOCK, SIDE = 2**14, 4
 """Paths traced at once, and pixels along a tile of path reuse."""
 
-WINDOW = 2**12
+WINDOW = 2**13
 """Columns that a pass looks at together: what memory a frame takes beside its reservoirs, and never what it gives."""
 
 
@@ -47,6 +47,14 @@ class Shot:
     def pixels(self) -> Array:
         """All pixels, (n,)."""
         return np.arange(self.tracer.sensor.n)
+
+    def over(self, work: Callable[[Tracer, Array, Chance], Array], pixel: Array, step: int = 1) -> Array:
+        """work(tracer, pixel, chance), (C, N), in windows whose sizes are multiples of `step`."""
+
+        def some(at: slice, chance: Chance) -> Array:
+            return work(self.tracer, pixel[at], chance)
+
+        return over_windows(some, len(pixel), self.chance, self.window, step)
 
 
 Frames = Callable[[Iterable[Shot], Preset, Shape], Iterator[Array]]
@@ -80,8 +88,13 @@ def reuse_in_tiles(shots: Iterable[Shot], preset: Preset, shape: Shape) -> Itera
     order = tiles(shape, SIDE)
     for shot in shots:
         image = np.empty((shot.tracer.scene.C, len(order)))
-        image[:, order] = path_reuse(shot.tracer, order, shot.chance, SIDE**2)
+        image[:, order] = shot.over(tiled, order, SIDE**2)
         yield image
+
+
+def tiled(t: Tracer, pixel: Array, chance: Chance) -> Array:
+    """One tree for each of `pixel` (N,), tile by tile, reused by its tile; (C, N)."""
+    return path_reuse(t, pixel, chance, SIDE**2)
 
 
 def resampled(make: Callable[[Tracer], Integrals]) -> Frames:
@@ -106,10 +119,14 @@ def resampled_lights(shots: Iterable[Shot], preset: Preset, shape: Shape) -> Ite
         of = light_integrals(t, chance.uniform((t.sensor.numbers, len(shot.pixels))), shot.pixels)
         here, (history, before) = Pixels(of, shot.pixels), recalled(remembered, shot)
         near = around(preset)(shape)(of, here.index, preset.neighbours, preset.radius, chance)
-        X = direct_light(here, near, DEBIASED["talbot"], chance, history, before)
-        tree = trace(t, chance.uniform((t.D, len(shot.pixels))), shot.pixels)
-        yield shade(X, here) + indirect_light(tree)
+        X = direct_light(here, near, DEBIASED["talbot"], chance, history, before, passes=windowed(shot.window))
+        yield shade(X, here) + shot.over(indirect, shot.pixels)
         remembered = kept(preset, shot, here, X)
+
+
+def indirect(t: Tracer, pixel: Array, chance: Chance) -> Array:
+    """What ReSTIR DI does not stand for, from one tree for each of `pixel` (N,); (C, N)."""
+    return indirect_light(trace(t, chance.uniform((t.D, len(pixel))), pixel))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ ones of the list farther, lamps farthest.  So a lamp in a wall shines, and from 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from restir_ref.batch import Array, take, total
 from restir_ref.transport.vectors import dot
 
 AT_ONCE = 2**18
-"""Pairs of facets whose boxes are compared at once."""
+"""Pairs of facets whose boxes are compared at once, or those of one facet if these are more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,18 +53,32 @@ def coincident(corners: Array, maps: Array, offsets: Array, least: float) -> Arr
         in_b, off_b = _seen_from(maps, offsets, b, corners[a], least)
         found.append(np.stack([a, b])[:, (in_a | in_b) & ~off_a & ~off_b])
     pairs = np.concatenate(found, axis=1)
+    pairs = pairs[:, np.lexsort(pairs[::-1])]
     return np.concatenate([pairs, pairs[::-1]], axis=1)
 
 
 def _boxes_that_meet(corners: Array, least: float) -> Iterator[tuple[Array, Array]]:
-    """Facets a < b, (P,) each, whose boxes along the axes are nowhere farther apart than `least`."""
+    """Facets a < b, (P,) each, whose boxes along the axes are nowhere farther apart than `least`.
+
+    Sorted along the axis that separates most of them, box i meets boxes i + 1 .. until one begins where it has ended.
+    """
     low, high = (corners.min(axis=1) - least).T, corners.max(axis=1).T
-    step = max(AT_ONCE // len(corners), 1)
-    for at in range(0, len(corners), step):
-        part = slice(at, at + step)
-        meet = [(l[:, None] <= h[part]) & (h[:, None] >= l[part]) for l, h in zip(low, high, strict=True)]
-        a, b = np.nonzero(np.logical_and.reduce(meet))
-        yield a[a < b + at], (b + at)[a < b + at]
+    order, far = min((_until(*ends) for ends in zip(low, high, strict=True)), key=lambda found: int(found[1].sum()))
+    low, high, upto = low[:, order], high[:, order], np.cumsum(far)
+    cuts = np.searchsorted(upto, np.arange(AT_ONCE, upto[-1] + AT_ONCE, AT_ONCE)) + 1
+    for start, stop in pairwise([0, *np.unique(np.minimum(cuts, len(order))).tolist()]):
+        i = np.arange(start, stop).repeat(far[start:stop])
+        j = i + 1 + np.arange(len(i)) - (upto - far)[i] + (upto - far)[start]
+        for l, h in zip(low, high, strict=True):
+            meet = (l[i] <= h[j]) & (h[i] >= l[j])
+            i, j = i[meet], j[meet]
+        yield np.minimum(order[i], order[j]), np.maximum(order[i], order[j])
+
+
+def _until(low: Array, high: Array) -> tuple[Array, Array]:
+    """Intervals in the order in which they begin, and how many of the next ones begin before each has ended; (S,)."""
+    order = np.argsort(low, kind="stable")
+    return order, np.searchsorted(low[order], high[order], side="right") - np.arange(1, len(low) + 1)
 
 
 def _seen_from(maps: Array, offsets: Array, a: Array, v: Array, least: float) -> tuple[Array, Array]:
@@ -106,5 +121,6 @@ def _height(c: Coincidence, prim: Array, w: Array) -> Array:
 
 def _covers(c: Coincidence, prim: Array, x: Array) -> Array:
     """Whether the facet is there at x, a point of its plane; (N,)."""
-    b = np.einsum("knd,dn->kn", c.maps[:-1].take(prim, axis=1), x) + c.offsets[:-1].take(prim, axis=1)
+    slopes = c.maps[:-1].take(prim, axis=1)
+    b = np.stack([dot(slope.T, x) for slope in slopes]) + c.offsets[:-1].take(prim, axis=1)
     return np.asarray((b >= 0).all(axis=0) & (total([*b]) <= 1))
