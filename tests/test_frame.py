@@ -160,15 +160,20 @@ NO_VENV_REMEDY, TOO_OLD_REMEDY = "apt-get install python3-venv", "make PYTHON=py
 needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
 
 
-def failed_setup(root: Path, makefile: str, script: str) -> tuple[str, bool]:
-    """Run `make setup` with a script for a Python that fails: what it says, and whether a .venv is left."""
+def set_up(root: Path, makefile: str, script: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run `make setup` with a script for a Python."""
     for name, text in {"Makefile": makefile, "constraints.txt": "", "pyproject.toml": ""}.items():
         plant(root, name, text)
     plant(root, "python", f"#!/bin/sh\n{script}")
     (root / "python").chmod(0o755)
-    env = {name: value for name, value in os.environ.items() if "MAKE" not in name and name != "MFLAGS"}
+    ours = {name: value for name, value in os.environ.items() if "MAKE" not in name and name not in ("MFLAGS", "CI")}
     command = ["make", "setup", "PYTHON=./python"]
-    done = subprocess.run(command, cwd=root, env=env, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=root, env=ours | environment, capture_output=True, text=True, check=False)
+
+
+def failed_setup(root: Path, makefile: str, script: str) -> tuple[str, bool]:
+    """Run it with a Python that fails: what it says, and whether a .venv is left."""
+    done = set_up(root, makefile, script)
     assert done.returncode != 0
     return done.stderr, (root / ".venv").exists()
 
@@ -189,3 +194,25 @@ def test_a_half_made_environment_and_an_unnamed_remedy_are_noticed(tmp_path):
     said, left = failed_setup(tmp_path, careless, NO_VENV)
     assert NO_VENV_REMEDY not in said
     assert left
+
+
+NO_WITNESS = """
+case "$*" in
+    "-m venv "*) mkdir -p .venv/bin && cp python .venv/bin/python;;
+    *reference*) exit 1;;
+esac
+"""
+
+
+@needs_make
+def test_set_up_does_without_mitsuba_where_there_is_no_package_of_it_and_says_so(tmp_path):
+    done = set_up(tmp_path, MAKEFILE, NO_WITNESS)
+    assert done.returncode == 0
+    assert "is skipped" in done.stderr
+
+
+@needs_make
+@pytest.mark.parametrize("fails", ["reference", "dev"])
+def test_ci_insists_on_mitsuba_and_everybody_on_the_rest(tmp_path, fails):
+    environment = {"CI": "1"} if fails == "reference" else {}
+    assert set_up(tmp_path, MAKEFILE, NO_WITNESS.replace("reference", fails), **environment).returncode != 0

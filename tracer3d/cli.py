@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from inspect import getdoc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +14,10 @@ from restir_ref.chance import Live
 from restir_ref.metrics import MAP, mape
 from tracer3d import compare, files
 from tracer3d.methods import METHODS, PRESETS
+from tracer3d.names import known
 from tracer3d.render import Chances, Job, Picture, blank, render
-from tracer3d.scenes import SCENES, setting
+from tracer3d.scene_files import Opened, digest, opened
+from tracer3d.scenes import SCENES
 
 Parser = argparse.ArgumentParser
 STOPPED = 130
@@ -34,6 +36,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("tracer3d: stopped before anything was done", file=sys.stderr)
         return STOPPED
+    except OSError as error:
+        print(f"tracer3d: error: {error}", file=sys.stderr)
+        return 2
 
 
 def parser() -> Parser:
@@ -54,21 +59,22 @@ def parser() -> Parser:
     _picture_options(comparing, Path("out/compared.png"))
     comparing.set_defaults(command=_compare)
     listing = commands.add_parser("list", help="scenes and methods; with --out, a sheet of thumbnails")
+    listing.add_argument("scenes", nargs="*", metavar="SCENE", help="a name, or a file NAME.toml; default: all names")
     listing.add_argument("--out", type=Path, metavar="FILE")
     listing.set_defaults(command=_list)
     return root
 
 
 RENDER = (
-    "Writes FILE.png (tone mapped), FILE.pfm (linear) and FILE.npz, from which the same command goes on, with more "
-    "--frames too. Ctrl-C keeps what is done. The picture of a still camera is the mean of its frames, that of a "
-    "moving one its last."
+    "Writes FILE.png (tone mapped), FILE.pfm (linear; FILE.exr if --out ends so) and FILE.npz, from which the same "
+    "command goes on, with more --frames too. Ctrl-C keeps what is done. The picture of a still camera is the mean of "
+    "its frames, that of a moving one its last."
 )
 COMPARE = "Gives every method the same rays or CPU time; prints a table, and draws pictures with maps of their errors."
 
 
 def _picture_options(command: Parser, out: Path) -> None:
-    command.add_argument("scene", metavar="SCENE", help=f"{', '.join(SCENES)}")
+    command.add_argument("scene", metavar="SCENE", help=f"{', '.join(SCENES)}; or a file NAME.toml")
     command.add_argument("--preset", default="realtime", metavar="P", help=f"{', '.join(PRESETS)} (%(default)s)")
     command.add_argument("--size", type=_size, default=(64, 64), metavar="WxH", help="columns x rows (64x64)")
     command.add_argument(
@@ -84,14 +90,22 @@ def _picture_options(command: Parser, out: Path) -> None:
     camera.add_argument("--moving", action="store_const", const=1.0, help="the camera slides from frame to frame")
     command.add_argument("--depth", type=_count, metavar="K", help="scattering vertices of the longest paths")
     command.add_argument("--seed", type=_count, default=1, metavar="S", help="(%(default)s)")
-    command.add_argument("--reference", type=Path, metavar="PFM", help="a picture to hold errors against")
+    command.add_argument("--reference", type=Path, metavar="FILE", help="a PFM or EXR to hold errors against")
     command.add_argument("--out", type=Path, default=out, metavar="FILE", help="(%(default)s)")
     command.set_defaults(moving=0.0)
 
 
 def _job(options: argparse.Namespace, method: str) -> Job:
-    crop = setting(options.scene).crop if options.crop == () else options.crop
-    return Job(options.scene, method, options.preset, options.size, crop, options.moving, options.depth, options.seed)
+    content = digest(options.scene)
+    crop = opened(options.scene, content).setting.crop if options.crop == () else options.crop
+    moving, depth, seed = options.moving, options.depth, options.seed
+    return Job(options.scene, method, options.preset, options.size, crop, moving, depth, seed, content)
+
+
+def _noted(found: Opened) -> None:
+    """Say what was left out of a scene."""
+    for note in found.notes:
+        print(f"tracer3d: note: {note}", file=sys.stderr)
 
 
 def _chances(seed: int) -> Chances:
@@ -101,9 +115,12 @@ def _chances(seed: int) -> Chances:
 def _reference(options: argparse.Namespace, job: Job) -> Array | None:
     if options.reference is None:
         return None
-    R = files.read_pfm(options.reference)
+    R = files.read_linear(options.reference)
     if R.shape[1:] != job.size[::-1]:
-        raise ValueError(f"{options.reference} has {R.shape[2]} x {R.shape[1]} pixels, but the picture {job.size}.")
+        columns, rows = job.size
+        raise ValueError(
+            f"{options.reference} has {R.shape[2]} x {R.shape[1]} pixels, but the picture {columns} x {rows}."
+        )
     return R
 
 
@@ -112,6 +129,8 @@ def _reference(options: argparse.Namespace, job: Job) -> Array | None:
 
 def _render(options: argparse.Namespace) -> Callable[[], int]:
     job = _job(options, options.method)
+    _noted(opened(job.scene, job.content))
+    files.check_out(options.out)
     begun = None if options.anew else files.load(options.out, job)
     R = _reference(options, job)
     return lambda: _run(job, options.frames, options.out, begun or blank(job), R)
@@ -133,7 +152,7 @@ def _run(job: Job, frames: int, out: Path, begun: Picture, R: Array | None) -> i
         print("tracer3d: stopped before the first frame was done; nothing is kept", file=sys.stderr)
         return status
     files.save(out, job, now)
-    done = f"{now.frames} of {frames} frames in {out.with_suffix('.png')}, linear in {out.with_suffix('.pfm')}"
+    done = f"{now.frames} of {frames} frames in {out.with_suffix('.png')}, linear in {files.linear(out)}"
     print(f"{done}; the same command goes on from there" if status else done)
     return status
 
@@ -143,7 +162,11 @@ def _run(job: Job, frames: int, out: Path, begun: Picture, R: Array | None) -> i
 
 def _compare(options: argparse.Namespace) -> Callable[[], int]:
     methods = options.methods.split(",")
+    for method in methods:
+        known(METHODS, method, "method")
     job, *_ = [_job(options, method) for method in methods]
+    _noted(opened(job.scene, job.content))
+    files.check_out(options.out)
     budget = compare.Budget(options.rays, options.seconds)
     if budget == compare.Budget():
         raise ValueError("a comparison needs a budget: say --rays 1000, or --seconds 10.")
@@ -155,7 +178,7 @@ def _compare(options: argparse.Namespace) -> Callable[[], int]:
 
 def _path_traced(job: Job, trees: int) -> Array:
     """A reference with random numbers of its own."""
-    by_path = Job(job.scene, "path", "realtime", job.size, job.crop, 0.0, job.depth, job.seed + 1)
+    by_path = replace(job, method="path", preset="realtime", moving=0.0, seed=job.seed + 1)
     *_, last = tqdm(
         render(by_path, _chances(job.seed + 1), trees, blank(by_path), job.setting(0).scene),
         total=trees,
@@ -166,33 +189,56 @@ def _path_traced(job: Job, trees: int) -> Array:
 
 
 def _side_by_side(job: Job, methods: Sequence[str], budget: compare.Budget, R: Array, out: Path) -> int:
-    rows = compare.compared(job, methods, budget, _chances(job.seed))
+    """Compare, and keep what there is, whatever ends it."""
+    rows: list[compare.Row] = []
+    try:
+        rows += compare.compared(job, methods, budget, _chances(job.seed))
+    except KeyboardInterrupt:
+        if not rows:
+            raise
     print(compare.table(rows, R))
     compare.sheet(out.with_suffix(".png"), rows, R)
-    print(f"pictures and errors in {out.with_suffix('.png')}")
-    return 0
+    left = ",".join(methods[len(rows) :])
+    print(f"pictures and errors in {out.with_suffix('.png')}" + (f"; to go on, say --methods {left}" if left else ""))
+    return STOPPED if left else 0
 
 
 def _list(options: argparse.Namespace) -> Callable[[], int]:
+    names = options.scenes or [*SCENES]
+    found = {name: opened(name, digest(name)) for name in names}
+    if options.out is not None:
+        files.check_out(options.out)
+
     def work() -> int:
         print("scenes:")
-        for name, make in SCENES.items():
-            print(f"  {name:24}{(getdoc(make) or '').splitlines()[0]}")
+        for name, each in found.items():
+            _noted(each)
+            print(f"  {name:23} {each.title}" + (f"\n{_described(each)}" if options.scenes else ""))
         print("methods:")
         for name, method in METHODS.items():
-            print(f"  {name:24}{method.words}")
-        return 0 if options.out is None else _thumbnails(options.out)
+            print(f"  {name:23} {method.words}")
+        return 0 if options.out is None else _thumbnails(names, options.out)
 
     return work
 
 
-def _thumbnails(out: Path, trees: int = 8) -> int:
+def _described(found: Opened) -> str:
+    """What a scene is made of, and who looks at it."""
+    at, s = found.setting, found.setting.scene
+    made = (
+        f"{s.S} triangles ({len(s.lights.upto)} shine), {s.radii.size} spheres, {len(s.materials.roughest)} materials"
+    )
+    return f"    {made}\n    seen from {at.eye} towards {at.towards}, depth {at.depth}, inset at {at.crop}"
+
+
+def _thumbnails(names: Sequence[str], out: Path, trees: int = 8) -> int:
     """Every scene, 160 x 90 pixels, side by side."""
-    jobs = [Job(name, "path", size=(160, 90)) for name in SCENES]
+    jobs = [Job(name, "path", size=(160, 90)) for name in names]
     shown = []
     for job in tqdm(jobs, unit="scene", file=sys.stderr):
         *_, last = render(job, _chances(1), trees, blank(job), job.setting(0).scene)
         shown.append(files.tone(last.mean, files.exposure(last.mean)))
+    shown += [np.ones_like(shown[0])] * (len(shown) > 1 and len(shown) % 2)
     pairs = [np.concatenate(shown[k : k + 2], axis=2) for k in range(0, len(shown), 2)]
     out.parent.mkdir(parents=True, exist_ok=True)
     files.write_shown(out.with_suffix(".png"), np.concatenate(pairs, axis=1))

@@ -9,15 +9,23 @@ import numpy as np
 
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
-from restir_ref.guards import named, whole
+from restir_ref.guards import whole
 from restir_ref.transport.paths import Tracer
 from restir_ref.transport.scene import Scene
 from tracer3d.methods import METHODS, PRESETS, Shot
-from tracer3d.scenes import Setting, setting
+from tracer3d.names import known
+from tracer3d.scene_files import digest, opened
+from tracer3d.scenes import Setting
 from tracer3d.sensors import Pinhole
 
 BYTES: Mapping[str, int] = MappingProxyType({"realtime": 12_000, "offline": 18_000})
 """Memory per pixel of methods that hold a whole frame, by preset: the most that was measured on `cornell`."""
+
+TRACED = 200
+"""The same for path tracing, which holds some images only."""
+
+RAY, BESIDE = 3e-8, 30
+"""Seconds for asking one surface for one ray, and how many surfaces all else costs as much as; 34 to 5000 measured."""
 
 MOST = 4 * 2**30
 """Bytes that a picture may need."""
@@ -30,6 +38,7 @@ Chances = Callable[[int], Chance]
 class Job:
     """What is asked for; whatever changes the picture but the number of frames.
 
+    scene  a name, or a file whose name ends in .toml;  content  the file's digest, by which a change of it is noticed
     size   columns and rows;  crop  column and row of the film at which they begin, None for all of the view
     moving  steps of the camera per frame: a picture of a moving camera is its last frame, of a still one the mean
     Raises ValueError for unknown names, a crop off the film, and pictures that need too much memory.
@@ -43,17 +52,21 @@ class Job:
     moving: float = 0.0
     depth: int | None = None
     seed: int = 1
+    content: str | None = None
 
     def __post_init__(self) -> None:
-        named(METHODS, self.method, "method")
-        named(PRESETS, self.preset, "preset")
+        if self.content is None:
+            object.__setattr__(self, "content", digest(self.scene))
+        known(METHODS, self.method, "method")
+        known(PRESETS, self.preset, "preset")
         for count in self.size:
             whole(count, 1, "each side of a picture", "Say --size 64x64.")
-        needed = self.size[0] * self.size[1] * BYTES[self.preset]
-        if self.method != "path" and needed > MOST:
+        needed = self.size[0] * self.size[1] * (TRACED if self.method == "path" else BYTES[self.preset])
+        if needed > MOST:
             raise ValueError(
                 f"a picture of {self.size[0]} x {self.size[1]} pixels by {self.method} needs about "
-                f"{needed / 2**30:.1f} GiB, more than {MOST / 2**30:.0f}: render a smaller one, a crop, or by path."
+                f"{needed / 2**30:.1f} GiB, more than {MOST / 2**30:.0f}, and {self.hours():.1f} hours a frame: "
+                f"render a smaller one, or a crop{'' if self.method == 'path' else ', or by path'}."
             )
         if self.method == "path-reuse" and any(count % 4 for count in self.size):
             raise ValueError(f"path reuse needs sides that are multiples of 4, but the size is {self.size}.")
@@ -61,8 +74,14 @@ class Job:
 
     def setting(self, frame: float) -> Setting:
         """The scene as the camera of a frame sees it."""
-        at, steps = _begun(self.scene, self.depth), frame * self.moving
+        at, steps = _begun(self.scene, self.content, self.depth), frame * self.moving
         return at.at(steps) if steps else at
+
+    def hours(self) -> float:
+        """About the time that path tracing of a frame takes: two rays per vertex, each of which asks every surface."""
+        at = self.setting(0)
+        rays = self.size[0] * self.size[1] * PRESETS[self.preset].trees * 2 * at.depth
+        return rays * (len(at.scene.material) + BESIDE) * RAY / 3600
 
     def sensor(self, frame: float) -> Pinhole:
         """The camera of a frame."""
@@ -75,8 +94,8 @@ class Job:
 
 
 @cache
-def _begun(scene: str, depth: int | None) -> Setting:
-    at = setting(scene)
+def _begun(scene: str, content: str | None, depth: int | None) -> Setting:
+    at = opened(scene, content).setting
     return at if depth is None else replace(at, depth=depth)
 
 

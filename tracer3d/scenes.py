@@ -6,7 +6,6 @@ right, y up, z towards the viewer.  All light has three channels: red, green and
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from types import MappingProxyType
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from restir_ref.guards import whole
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.scene import Ball, Facet, Scene, scene
+from tracer3d.names import known
 from tracer3d.sensors import FILM, UP, Pinhole, Point, check_view
 from tracer3d.shapes import block, box, joined, lamp, quad, rectangle, room, turned, walls
 from tracer3d.space import SOLID
@@ -23,7 +23,7 @@ INSET = 64
 
 
 PACE = 2.5, 0.5
-"""Pixels of the film, to the right and up, by which a moving camera slides from frame to frame."""
+"""The usual pace of a moving camera, pixels of the film."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +31,7 @@ class Setting:
     """A scene with the place to look from, and the inset that shows why it matters.
 
     crop  column and row of the film at which the inset begins;  half  tangent of half the film's field of view
+    pace  pixels of the film, to the right and up, by which a moving camera slides from frame to frame
     Raises ValueError for a depth that is no whole number >= 1, and for an eye in a solid or one that sees nothing.
     """
 
@@ -41,6 +42,7 @@ class Setting:
     depth: int = 4
     half: float = 0.8
     up: Point = UP
+    pace: tuple[float, float] = PACE
 
     def __post_init__(self) -> None:
         whole(self.depth, 1, "the path depth", "It counts scattering vertices; 1 is direct light.")
@@ -60,10 +62,10 @@ class Setting:
         return Pinhole(self.eye, self.towards, width, height, half, film=(width, height), up=self.up)
 
     def at(self, frame: float) -> "Setting":
-        """The setting seen by a moving camera: it slides by PACE pixels per frame, measured where the target is."""
+        """The setting seen by a moving camera: it slides by its pace per frame, measured where the target is."""
         _, right, up = self.pinhole().axes()
         pixel = 2 * self.half / FILM[0] * np.linalg.norm(np.subtract(self.towards, self.eye))
-        x, y, z = (frame * pixel * (PACE[0] * right + PACE[1] * up))[:, 0].tolist()
+        x, y, z = (frame * pixel * (self.pace[0] * right + self.pace[1] * up))[:, 0].tolist()
         eye, towards = ((p[0] + x, p[1] + y, p[2] + z) for p in (self.eye, self.towards))
         return replace(self, eye=eye, towards=towards)
 
@@ -227,8 +229,4 @@ SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
 
 def setting(name: str) -> Setting:
     """The scene of that name.  Raises ValueError for an unknown one, with the nearest."""
-    if name not in SCENES:
-        near = get_close_matches(name, SCENES, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(SCENES)}."
-        raise ValueError(f"there is no scene {name!r}: {hint}")
-    return SCENES[name]()
+    return known(SCENES, name, "scene")()

@@ -16,6 +16,7 @@ from benchmarks.jobs import (
     roundtrips,
     space_references,
     tracing,
+    witness,
 )
 from benchmarks.jobs.job import Done, Job
 
@@ -32,6 +33,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "baselines": baselines.JOB,
         "offline": offline.JOB,
         "probes": probes.JOB,
+        "witness": witness.JOB,
     }
 )
 PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType(
@@ -39,6 +41,7 @@ PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType(
         "references": references.publish,
         "indirect references": indirect_references.publish,
         "space references": space_references.publish,
+        "witness": witness.publish,
     }
 )
 """What else a job leaves behind, in the checkout at a path."""

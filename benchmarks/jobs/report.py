@@ -16,7 +16,7 @@ from benchmarks.jobs.job import ROOT, SEED, Done, Job, Row, depends
 from figures.engine import disk
 
 JSON, TABLE = "benchmarks/evidence.json", "docs/evidence.md"
-MEASURED_CODE = ("restir_ref", "flatland2d", "benchmarks", "tests/transport")
+MEASURED_CODE = ("restir_ref", "flatland2d", "tracer3d", "benchmarks", "tests/transport", "tests/tracer3d")
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,8 @@ WANTED = (
     ("GlassBall3", ""),
     ("CB3", INDIRECT),
     ("CB3-glossy", INDIRECT),
+    ("CB3-glossy, box", INDIRECT),
+    ("CB3-glossy, foot", INDIRECT),
 )
 COUNT, LIMIT = 8, 0.005
 

@@ -79,7 +79,7 @@ def moved(method: Method, scene: str, replicas: int, rng: np.random.Generator, s
     return {"images": judged(scene, images), "rays": np.array(cost)}
 
 
-def still(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Pinhole | None = None) -> Arrays:
+def still(method: Method, scene: str, replicas: int, rng: np.random.Generator, sensor: Sensor | None = None) -> Arrays:
     """The first frame and the last half of a still camera's, (1 + FRAMES // 2, replicas, n), and rays per pixel."""
     asked = Counter[str]()
     of = method.integrals(view(scene, method.rule, asked, sensor).tracer)

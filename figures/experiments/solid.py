@@ -15,7 +15,7 @@ from tracer3d import scenes
 from tracer3d.scenes import Setting
 from tracer3d.sensors import FILM, Mosaic, Pinhole
 
-SIDE, COUNT = 32, 5
+SIDE, COUNT = 24, 5
 """Columns and rows of a crop, and how many there are."""
 
 GENERATORS = 0.7548776662466927, 0.5698402909980532
@@ -31,6 +31,27 @@ SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
         "ManyLights3": scenes.many_lights,
     }
 )
+
+
+WIDE = 36
+"""Columns and rows of an inset."""
+
+INSETS: Mapping[str, tuple[str, tuple[int, int]]] = MappingProxyType(
+    {
+        "CB3, box": ("CB3", (960, 700)),
+        "CB3-glossy, box": ("CB3-glossy", (960, 700)),
+        "CB3-glossy, foot": ("CB3-glossy", (1076, 1022)),
+    }
+)
+"""Scenes seen through an inset of their own, with the film's pixel in its middle: the low box's upright edge, with the
+tall one behind it; and its foot in front, where it stands on the floor.
+"""
+
+
+def inset(name: str, wide: int = WIDE) -> Mosaic:
+    """One of the insets, square."""
+    scene, (x, y) = INSETS[name]
+    return Mosaic(SCENES[scene]().pinhole(wide, wide), ((x - wide // 2, y - wide // 2),))
 
 
 def crops(setting: Setting) -> Mosaic:

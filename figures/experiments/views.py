@@ -1,6 +1,6 @@
 """What figures look at, in the plane and in space: a scene by its name, its rule of connections, sensor and neighbours.
 
-Scenes of flatland go by their own names, those of space by the names they have in `solid.SCENES`.
+Scenes of flatland go by their own names, those of space by the names they have in `solid`.
 """
 
 from collections import Counter
@@ -50,16 +50,19 @@ class Traced(Image, Protocol):
 
 def setting(scene: str) -> Any:
     """A setting of flatland2d or tracer3d: scene, depth and camera."""
-    return (solid.SCENES if in_space(scene) else SCENES)[scene]()
+    name, _ = solid.INSETS.get(scene, (scene, None))
+    return (solid.SCENES if in_space(scene) else SCENES)[name]()
 
 
 def in_space(scene: str) -> bool:
     """Whether the name is that of a scene of tracer3d."""
-    return scene in solid.SCENES
+    return scene in solid.SCENES or scene in solid.INSETS
 
 
 def standard(scene: str) -> Any:
-    """The sensor unless told otherwise: the inset of flatland, the crops of space."""
+    """The sensor unless told otherwise: the inset of flatland, the crops of space, or the inset that the name says."""
+    if scene in solid.INSETS:
+        return solid.inset(scene)
     return solid.crops(setting(scene)) if in_space(scene) else setting(scene).pinhole()
 
 

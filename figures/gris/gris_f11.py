@@ -6,7 +6,7 @@ indirect light, and the reference path tracing with trees of its own.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -24,9 +24,20 @@ from restir_ref.metrics import rel_mse
 from restir_ref.transport.baselines.restir_di import indirect_light
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Picture
 
-SCENES = {"cornell": "rough boxes (r = .5)", "glossy_cornell": "glossy boxes (r = .15)"}
+
+@dataclass(frozen=True)
+class Boxes:
+    """The names of a scene with rough boxes and of the same with glossy ones."""
+
+    rough: str
+    glossy: str
+
+
+FLAT = Boxes("cornell", "glossy_cornell")
+TITLES = Boxes("rough boxes (r = .5)", "glossy boxes (r = .15)")
 METHODS = ("path tracing", "reconnection", "hybrid")
 
 
@@ -36,7 +47,8 @@ TRUTH = offline.Method(lattice_tracing(indirect_light), 0)
 
 def chunks(preset: Any) -> Sequence[dict[str, str]]:
     """Every scene and method, and the truth, whose random numbers are its own."""
-    return [*offline.chunks(tuple(SCENES), METHODS), *({"scene": scene, "what": "truth"} for scene in SCENES)]
+    scenes = FLAT.rough, FLAT.glossy
+    return [*offline.chunks(scenes, METHODS), *({"scene": scene, "what": "truth"} for scene in scenes)]
 
 
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
@@ -62,13 +74,19 @@ def errors(a: Arrays, scene: str, images: Array) -> Array:
 
 
 def check(a: Arrays) -> list[Claim]:
+    """Of flatland."""
+    return judged(a, FLAT)
+
+
+def judged(a: Arrays, boxes: Boxes) -> list[Claim]:
     """At one frame and at the longest mean that leaves eight groups, at equal samples; equal rays beside it."""
-    return [claim for name, T in (("one frame", 1), ("a mean of frames", longest(a))) for claim in at(a, name, T)]
+    spans = {"one frame": 1, "a mean of frames": longest(a, boxes)}
+    return [claim for name, T in spans.items() for claim in at(a, boxes, name, T)]
 
 
-def at(a: Arrays, name: str, T: int) -> list[Claim]:
+def at(a: Arrays, boxes: Boxes, name: str, T: int) -> list[Claim]:
     """Claims on means of T frames."""
-    rough, glossy = ({m: groups(a, scene, m, T) for m in METHODS} for scene in SCENES)
+    rough, glossy = ({m: groups(a, scene, m, T) for m in METHODS} for scene in (boxes.rough, boxes.glossy))
     caveat = SHORT.format(T) if T > 1 else ""
     claims = []
     for method in METHODS[1:]:
@@ -104,16 +122,23 @@ def groups(a: Arrays, scene: str, method: str, T: int) -> Array:
     return errors(a, scene, offline.after(a, scene, method, T))
 
 
-def longest(a: Arrays) -> int:
+def longest(a: Arrays, boxes: Boxes) -> int:
     """Frames in a mean, with at least eight groups of them."""
-    return min(len(a[f"{scene}.hybrid.images"]) for scene in SCENES) // 8
+    return min(len(a[f"{scene}.hybrid.images"]) for scene in (boxes.rough, boxes.glossy)) // 8
 
 
 def draw(a: Arrays) -> "Picture":
     """relMSE over frames; path tracing at equal samples, rays and time; error by pixel."""
     picture, axes = style.panels(1, 3, width=3.9, height=3.9)
-    T = 2 ** np.arange(int(np.log2(longest(a))) + 1)
-    for axis, (scene, title) in zip(axes[0, :2], SCENES.items(), strict=True):
+    convergence(axes[0, :2], a, FLAT)
+    by_pixel(a, axes[0, 2])
+    return picture
+
+
+def convergence(panels: "Sequence[Axes] | Array", a: Arrays, boxes: Boxes) -> None:
+    """relMSE of means of frames, rough boxes on the left."""
+    T = 2 ** np.arange(int(np.log2(longest(a, boxes))) + 1)
+    for axis, scene, title in zip(panels, (boxes.rough, boxes.glossy), (TITLES.rough, TITLES.glossy), strict=True):
         prices: dict[str, Callable[[int], float]] = {
             "equal samples": offline.equal_samples,
             "equal rays": partial(offline.equal_rays, a, scene, "hybrid"),
@@ -132,8 +157,6 @@ def draw(a: Arrays) -> "Picture":
         axis.margins(x=0.1)
         axis.set(xlabel="frames T in the mean", ylabel="relMSE of the mean", title=title)
         style.below(axis, ncols=1)
-    by_pixel(a, axes[0, 2])
-    return picture
 
 
 PRICES: dict[str, dict[str, Any]] = {

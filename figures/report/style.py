@@ -31,6 +31,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 HATCHES = ("", "//", "..", "xx", "\\\\", "++", "oo")
 LABELLED = 38.0
 """Height of ticks and label under an axis, in points."""
+BETWEEN = 2
+"""Pixels between crops of an image."""
 SPARSE = 0.08
 """Distance between markers of a line, in diagonals of its axes."""
 
@@ -201,6 +203,28 @@ def strips(axis: "Axes", rows: Sequence[Any], names: Sequence[str], high: float,
     axis.figure.colorbar(shown, ax=axis, **{"label": "radiance", "extend": "max", "pad": 0.02, **bar})
     axis.set_yticks(np.arange(len(rows)) + 0.5, list(names))
     axis.grid(visible=False)
+
+
+def crops(axis: "Axes", images: "Mapping[str, NDArray[Any]]", *, side: int = 24, title: str = "") -> None:
+    """Images (n,) of square crops by their names, the first one the reference, of whose pixels the scale is made."""
+    reference = next(iter(images.values()))
+    high = float(np.quantile(reference, 0.99)) * 1.3
+    shown = np.concatenate([_side_by_side(image, side) for image in images.values()])
+    found = axis.imshow(shown, vmin=0, vmax=high, aspect="equal")
+    axis.figure.colorbar(found, ax=axis, label="radiance, mean of channels", shrink=0.8)
+    height = side + BETWEEN
+    axis.set_yticks(np.arange(len(images)) * height + side / 2, list(images))
+    width = len(reference) // side**2
+    axis.set_xticks(np.arange(width) * height + side / 2, [str(k + 1) for k in range(width)])
+    axis.grid(visible=False)
+    axis.set(xlabel=f"crop of the film, {side} pixels wide", title=title)
+
+
+def _side_by_side(image: NDArray[Any], side: int) -> NDArray[Any]:
+    """Crops side by side, NaN between them."""
+    parts = image.reshape(-1, side, side)
+    framed = np.pad(parts, ((0, 0), (0, BETWEEN), (0, BETWEEN)), constant_values=np.nan)
+    return np.concatenate(list(framed), axis=1)
 
 
 def below(axis: "Axes", **changes: Any) -> None:

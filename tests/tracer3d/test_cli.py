@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from tracer3d import cli, files, methods
 from tracer3d.methods import METHODS
@@ -84,12 +85,10 @@ def test_list_names_every_scene_and_method(capsys):
     assert all(name in said for name in [*SCENES, *METHODS])
 
 
-def test_thumbnails_are_drawn_two_in_a_row(tmp_path, monkeypatch):
-    monkeypatch.setattr(cli, "SCENES", {name: SCENES[name] for name in ("crease", "furnace")})
-    assert cli._thumbnails(tmp_path / "t.png", trees=1) == 0
-    from matplotlib.image import imread  # noqa: PLC0415
-
-    assert imread(tmp_path / "t.png").shape == (90, 320, 4)
+@pytest.mark.parametrize(("names", "shape"), [(["crease"], (90, 160)), (["crease", "furnace", "crease"], (180, 320))])
+def test_thumbnails_are_drawn_two_in_a_row(tmp_path, names, shape):
+    assert cli._thumbnails(names, tmp_path / "t.png", trees=1) == 0
+    assert imread(tmp_path / "t.png").shape == (*shape, 4)
 
 
 def test_the_camera_stands_unless_told_to_move():
@@ -100,11 +99,15 @@ def test_the_camera_stands_unless_told_to_move():
 
 MISTAKES = {
     "a misspelt scene": (["corneli"], "no scene 'corneli': did you mean 'cornell'?"),
-    "an unknown method": (["crease", "--method", "pth"], "no method 'pth', only 'path'"),
-    "an unknown preset": (["crease", "--preset", "fast"], "no preset 'fast', only 'realtime', 'offline'"),
+    "an unknown method": (["crease", "--method", "pth"], "no method 'pth': did you mean 'path'?"),
+    "an unknown preset": (["crease", "--preset", "fast"], "no preset 'fast': there are realtime, offline."),
     "a crop off the film": (["crease", "--crop", "1900,0"], "begins at 1900 and has 64"),
     "a size of nothing": (["crease", "--size", "0x4"], "is 0. Say --size 64x64."),
-    "an absurd size": (["crease", "--size", "20000x20000"], "needs about 4470.3 GiB, more than 4"),
+    "an absurd size": (
+        ["crease", "--size", "20000x20000"],
+        "needs about 4470.3 GiB, more than 4, and 1.2 hours a frame",
+    ),
+    "an absurd size by path": (["crease", "--method", "path", "--size", "20000x20000"], "about 74.5 GiB, more than 4"),
     "a depth of 0": (["crease", "--depth", "0"], "the path depth must be a whole number >= 1, but is 0"),
     "tiles that do not fill it": (["crease", "--method", "path-reuse", "--size", "10x8"], "multiples of 4"),
     "a missing reference": (["crease", "--reference", "nowhere.pfm"], "nowhere.pfm"),
@@ -136,7 +139,7 @@ def test_words_that_are_no_numbers_are_refused(capsys, words, said):
 def test_a_reference_of_another_size_and_a_comparison_without_budget_are_refused(tmp_path, capsys):
     files.write_pfm(tmp_path / "r.pfm", np.ones((3, 4, 6)))
     assert run("render", "crease", *SMALL, "--reference", tmp_path / "r.pfm", "--out", tmp_path / "a.png") == 2
-    assert "has 6 x 4 pixels, but the picture (8, 8)" in capsys.readouterr().err
+    assert "has 6 x 4 pixels, but the picture 8 x 8." in capsys.readouterr().err
     assert run("compare", "crease", *SMALL) == 2
     assert "say --rays 1000, or --seconds 10" in capsys.readouterr().err
 

@@ -10,7 +10,7 @@ from flatland2d.scenes import LAMP, chain, matte
 from flatland2d.scenes import room as square
 from restir_ref.batch import Array
 from restir_ref.chance import Live
-from restir_ref.transport import intersection
+from restir_ref.transport import coincidence, intersection
 from restir_ref.transport.coincidence import coincident
 from restir_ref.transport.compact import Peephole
 from restir_ref.transport.materials import Layer, Material
@@ -294,3 +294,35 @@ def test_shifts_across_two_materials_in_one_place_are_right():
 def test_a_connection_to_the_back_of_what_is_there_is_convicted(monkeypatch):
     monkeypatch.setattr(Scene, "meets", lambda s, x, y, prim: s.visible(x, y))
     assert "traced from scratch" in convicted()
+
+
+# ---------------------------------------------------------------- which boxes meet
+
+
+def in_a_lattice(d: int, n: int) -> Array:
+    """Corners (n, d, d) of facets on few planes, many of which touch or coincide."""
+    return np.random.default_rng(d).integers(0, 4, (n, d, d)).astype(float)
+
+
+def missing(corners: Array, least: float) -> set[tuple[int, int]]:
+    """Pairs whose boxes are nowhere farther apart than `least`, by comparing all, against those that are found."""
+    low, high = corners.min(axis=1) - least, corners.max(axis=1)
+    all_pairs = (low[:, None] <= high[None]).all(axis=2) & (high[:, None] >= low[None]).all(axis=2)
+    found = [pair for a, b in coincidence._boxes_that_meet(corners, least) for pair in zip(a, b, strict=True)]
+    assert len(found) == len(set(found))
+    return set(zip(*np.nonzero(np.triu(all_pairs, 1)), strict=True)) ^ set(found)
+
+
+@every_space
+@pytest.mark.parametrize("at_once", [1, 30, 2**18])
+@pytest.mark.parametrize("n", [1, 2, 80])
+def test_boxes_that_meet_are_those_of_comparing_all(space, n, at_once, monkeypatch):
+    monkeypatch.setattr(coincidence, "AT_ONCE", at_once)
+    assert missing(in_a_lattice(space.d, n), 1e-9) == set()
+    assert missing(2.0 * in_a_lattice(space.d, n) + np.arange(n)[:, None, None] / n, 1e-9) == set()
+
+
+def test_a_sweep_that_ends_too_early_is_noticed(monkeypatch):
+    right = coincidence._until
+    monkeypatch.setattr(coincidence, "_until", lambda *given: (right(*given)[0], np.maximum(right(*given)[1] - 1, 0)))
+    assert missing(in_a_lattice(3, 80), 1e-9)

@@ -1,0 +1,60 @@
+"""What path tracing in space costs beside Mitsuba 3: paths per CPU-second of one thread, as ratios.
+
+Both trace the same crop of CB3 at depth 4, by turns in one run; the least CPU time of each counts, for others on the
+machine only add to it.  Exits with 1 if a requirement is missed; without Mitsuba nothing is measured.  Takes 30 s.
+"""
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from types import ModuleType
+
+import numpy as np
+from bench_resampling import Row, keep_freed_memory, print_sections
+from bench_transport import cpu, rng
+
+from restir_ref.chance import Live
+from restir_ref.transport.paths import RECONNECTION, Tracer
+from tracer3d.methods import traced
+from tracer3d.scenes import SCENES
+from tracer3d.witness import exported, mitsuba, rendered
+
+SCENE, DEPTH = "cornell", 4
+SAMPLES = 16
+"""Paths per pixel of an inset."""
+REPEATS = 7
+
+
+def main() -> int:
+    """Print all rows; 1 if a requirement is missed."""
+    keep_freed_memory()
+    try:
+        mi = mitsuba("scalar_rgb")
+    except ImportError as missing:
+        print(f"nothing is measured: {missing}")
+        return 0
+    return print_sections(sections(mi))
+
+
+def paths(mi: ModuleType) -> Iterator[Row]:
+    """Ours over theirs."""
+    at = SCENES[SCENE]()
+    sensor = at.pinhole()
+    t, loaded = Tracer(at.scene, sensor, DEPTH, RECONNECTION), mi.load_dict(exported(mi, at.scene, sensor, DEPTH))
+    pixel = np.tile(np.arange(sensor.n), SAMPLES)
+    runs = {
+        "ours": lambda: traced(t, pixel, Live(rng())),
+        "theirs": lambda: rendered(mi, loaded, SAMPLES, 1),
+    }
+    found = cpu(runs, REPEATS)
+    what = f"{SCENE}, depth {DEPTH}: paths per CPU-second over those of Mitsuba's scalar_rgb (aim 1)"
+    yield Row(what, found["theirs"] / found["ours"], least=0.55)
+
+
+def sections(mi: ModuleType) -> Mapping[str, Callable[[], Iterator[Row]]]:
+    """All that is measured."""
+    return {"Path tracing in pure NumPy": partial(paths, mi)}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,68 @@
+"""When reuse pays, in space: at the edge of a box, rough and glossy.
+
+As in flatland, by the same code.  A neighbour in the plane is rarely as near as in a row, so fewer trees are enough to
+make reuse a loss (`experiments.reuse`).
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from figures.claims.figure import Arrays, Figure
+from figures.experiments import reuse, solid
+from figures.experiments.views import HYBRID, at_random, view
+from figures.trust.pays_2d import check, measured, pictured
+from restir_ref.batch import Array
+from restir_ref.chance import Live
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
+
+SCENES, RADII = ("CB3, box", "CB3-glossy, box"), (3, 10)
+WIDE, SIDE = 24, 6
+"""Columns and rows of the insets, and of the squares of pixels whose variances are averaged."""
+
+
+def chunks(preset: Any) -> Sequence[dict[str, Any]]:
+    """One per scene and radius."""
+    return [{"scene": scene, "radius": radius} for scene in SCENES for radius in RADII]
+
+
+def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
+    """`measured` of an inset."""
+    of = view(chunk["scene"], HYBRID, Counter(), solid.inset(chunk["scene"], WIDE))
+    return measured(of, reuse.distinct(of, at_random, chunk["radius"], Live(rng)), preset["replicas"], rng)
+
+
+def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
+    """Everything by "scene.radius.name"."""
+    named = zip(chunks(preset), results, strict=True)
+    return {f"{c['scene']}.{c['radius']}.{name}": array for c, part in named for name, array in part.items()}
+
+
+def in_squares(pixels: Array) -> Array:
+    """Means of squares of SIDE x SIDE pixels."""
+    n = WIDE // SIDE
+    return np.asarray(pixels.reshape(n, SIDE, n, SIDE).mean(axis=(1, 3)).ravel())
+
+
+def draw(a: Arrays) -> "Picture":
+    """As in flatland."""
+    return pictured(a, SCENES, RADII, in_squares)
+
+
+FIGURE = Figure(
+    id="PAYS-3D",
+    title="When reuse pays, in space",
+    world="tracer3d",
+    source="of this project, about [GRIS 8.3, 9.1]",
+    claims=(),
+    presets={"quick": {"replicas": 16}, "paper": {"replicas": 1024}},
+    chunks=chunks,
+    compute=compute,
+    combine=combine,
+    draw=draw,
+    check=check,
+)
