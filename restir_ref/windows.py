@@ -115,13 +115,12 @@ class Columns:
 
     def random(self, shape: int | tuple[int, ...]) -> Array:
         """Uniform numbers in [0, 1), (.., columns of the window)."""
-        *_, width = shape = (shape,) if isinstance(shape, int) else shape
-        if width != self.at.stop - self.at.start:
+        found, width = np.empty(shape), self.at.stop - self.at.start
+        if found.shape[-1:] != (width,):
             raise ValueError(
-                f"a window of {self.at.stop - self.at.start} columns was asked for rows of {width} numbers: ask for "
-                f"one number per column, with the batch axis last."
+                f"a window of {width} columns was asked for numbers of shape {found.shape}: ask for one per column, "
+                f"with the batch axis last."
             )
-        found = np.empty(shape)
         for row in found.reshape(-1, width):
             skip(self.rng, self.at.start)
             self.rng.random(out=row)

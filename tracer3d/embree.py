@@ -161,18 +161,30 @@ def ordered(x: Array, y: Array) -> tuple[Array, Array]:
     return np.where(swap, y, x), np.where(swap, x, y)
 
 
+def embree() -> tuple[Any, Any]:
+    """Embree's modules of scenes and of meshes.  Raises ValueError, naming the extra, where it is not installed."""
+    try:
+        return import_module("embreex.rtcore_scene"), import_module("embreex.mesh_construction")
+    except ImportError:
+        raise ValueError("this needs the package embreex: install restir-ref with its extra 'embree'.") from None
+
+
 def with_embree(scene: Scene) -> Scene:
-    """The same scene, whose surfaces are asked by Embree.  Raises ImportError naming the extra if it is not installed."""
-    brute = scene.surfaces
+    """The same scene, whose facets are asked by Embree.
+
+    Raises ValueError where it is not installed, TypeError for a scene that is no longer asked by its matrices.
+    """
+    brute, (scenes, meshes) = scene.surfaces, embree()
     if not isinstance(brute, Matrices):
         raise TypeError(f"Embree is built beside the matrices of a scene, but its surfaces are {type(brute).__name__}.")
-    try:
-        scenes, meshes = import_module("embreex.rtcore_scene"), import_module("embreex.mesh_construction")
-    except ImportError as error:
-        raise ImportError("Embree is not installed: pip install 'restir-ref[embree]', or ask by brute force.") from error
     tree = scenes.EmbreeScene(robust=True)
     meshes.TriangleMesh(tree, np.ascontiguousarray(scene.corners.transpose(2, 0, 1), dtype=np.float32))
     maps = np.concatenate([brute.maps, brute.offsets], axis=1).reshape(brute.d, -1, brute.d + 1)
-    none = coincidence(np.zeros((2, 0), dtype=int), np.zeros(0), brute.coincidence.normals, brute.maps[:0], brute.offsets[:0])
-    balls = replace(brute, maps=brute.maps[:0], offsets=brute.offsets[:0], coincidence=none)
-    return replace(scene, surfaces=Embree(brute, balls, maps.transpose(0, 2, 1).copy(), tree))
+    return replace(scene, surfaces=Embree(brute, _balls(brute), maps.transpose(0, 2, 1).copy(), tree))
+
+
+def _balls(s: Matrices) -> Matrices:
+    """The balls alone."""
+    maps, offsets = s.maps[:0], s.offsets[:0]
+    none = coincidence(np.zeros((2, 0), dtype=int), np.zeros(0), s.coincidence.normals, maps, offsets)
+    return replace(s, maps=maps, offsets=offsets, coincidence=none)
