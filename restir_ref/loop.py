@@ -34,6 +34,18 @@ REAL_TIME = Preset(trees=1, rounds=1, neighbours=3, radius=20, cap=20)
 OFFLINE = Preset(trees=32, rounds=3, neighbours=6, radius=10, cap=np.nan)
 """32 path trees resampled to one, 3 rounds with 6 neighbours within 10 pixels; no temporal reuse, so no cap."""
 
+@dataclass(frozen=True)
+class Passes:
+    """Who runs the passes of a frame: `restir` itself, or the same over windows of columns (`windows`)."""
+
+    initial: Callable[..., Reservoirs]
+    temporal: Callable[..., Reservoirs]
+    spatial: Callable[..., Reservoirs]
+
+
+WHOLE = Passes(initial, temporal, spatial)
+"""All columns at once."""
+
 Around = Callable[[Image, Array, int, float, Chance], Sequence[Pixels]]
 """Chooses neighbours: (image, columns, how many, radius in pixels, chance) -> one Pixels each."""
 
@@ -45,19 +57,21 @@ def frame(
     around: Around,
     history: Reservoirs | None = None,
     before: Sequence[Pixels] = (),
+    passes: Passes = WHOLE,
 ) -> Reservoirs:
     """One frame: initial samples, temporal reuse if there is history, rounds of spatial reuse.
 
     history are the previous frame's reservoirs, `before` the columns of it that motion vectors
     name, in the previous frame's integrals.
     """
-    X = initial(here, chance, preset.trees)
+    X = passes.initial(here, chance, preset.trees)
     if history is not None:
-        X = temporal(X, here, history, before, chance, mis=named(WEIGHTS, preset.along, "MIS weight"), cap=preset.cap)
+        along = named(WEIGHTS, preset.along, "MIS weight")
+        X = passes.temporal(X, here, history, before, chance, mis=along, cap=preset.cap)
     for _ in range(preset.rounds):
         image: Image = here.of  # type: ignore[assignment]
         near = around(image, here.index, preset.neighbours, preset.radius, chance)
-        X = spatial(X, here, near, chance, mis=named(WEIGHTS, preset.across, "MIS weight"))
+        X = passes.spatial(X, here, near, chance, mis=named(WEIGHTS, preset.across, "MIS weight"))
     return X
 
 

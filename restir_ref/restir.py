@@ -131,7 +131,7 @@ def reusing(X: Reservoirs, here: Pixels, Y: Reservoirs, sources: Sequence[Pixels
             f"but has {here.index[place]} at place {place}: for others take() the sources and pass Inputs to gris()."
         )
     for n in (pixels(source.of) for source in sources):
-        if np.size(Y.W) not in (n, images * n):
+        if np.size(Y.W) != n and np.size(Y.W) * pixels(here.of) != len(here.index) * n:
             raise ValueError(
                 f"the sources' image has {n} pixels and the pass is for {images:g} images, but there are "
                 f"{np.size(Y.W)} reservoirs: hand over {images * n:g}, or {n} for all, with the image they are of."

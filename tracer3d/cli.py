@@ -15,7 +15,7 @@ from restir_ref.metrics import MAP, mape
 from tracer3d import compare, files
 from tracer3d.methods import METHODS, PRESETS
 from tracer3d.names import known
-from tracer3d.render import Chances, Job, Picture, blank, render
+from tracer3d.render import INTERSECT, Chances, Job, Picture, blank, render
 from tracer3d.scene_files import Opened, digest, opened
 from tracer3d.scenes import SCENES
 
@@ -90,6 +90,7 @@ def _picture_options(command: Parser, out: Path) -> None:
     camera.add_argument("--moving", action="store_const", const=1.0, help="the camera slides from frame to frame")
     command.add_argument("--depth", type=_count, metavar="K", help="scattering vertices of the longest paths")
     command.add_argument("--seed", type=_count, default=1, metavar="S", help="(%(default)s)")
+    command.add_argument("--intersect", default="brute", metavar="I", help=f"{' or '.join(INTERSECT)} (%(default)s)")
     command.add_argument("--reference", type=Path, metavar="FILE", help="a PFM or EXR to hold errors against")
     command.add_argument("--out", type=Path, default=out, metavar="FILE", help="(%(default)s)")
     command.set_defaults(moving=0.0)
@@ -98,8 +99,8 @@ def _picture_options(command: Parser, out: Path) -> None:
 def _job(options: argparse.Namespace, method: str) -> Job:
     content = digest(options.scene)
     crop = opened(options.scene, content).setting.crop if options.crop == () else options.crop
-    moving, depth, seed = options.moving, options.depth, options.seed
-    return Job(options.scene, method, options.preset, options.size, crop, moving, depth, seed, content)
+    moving, depth, seed, intersect = options.moving, options.depth, options.seed, options.intersect
+    return Job(options.scene, method, options.preset, options.size, crop, moving, depth, seed, content, intersect)
 
 
 def _noted(found: Opened) -> None:
@@ -141,7 +142,7 @@ def _run(job: Job, frames: int, out: Path, begun: Picture, R: Array | None) -> i
     now, status = begun, 0
     with tqdm(total=frames, initial=begun.frames, unit="frame", file=sys.stderr) as bar:
         try:
-            for now in render(job, _chances(job.seed), frames, begun, job.setting(0).scene):
+            for now in render(job, _chances(job.seed), frames, begun, job.compiled()):
                 if R is not None:
                     error = float(mape(now.mean.mean(axis=0), R.mean(axis=0), MAP))
                     bar.set_postfix_str(f"MAPE {error:.4f}", refresh=False)
@@ -180,7 +181,7 @@ def _path_traced(job: Job, trees: int) -> Array:
     """A reference with random numbers of its own."""
     by_path = replace(job, method="path", preset="realtime", moving=0.0, seed=job.seed + 1)
     *_, last = tqdm(
-        render(by_path, _chances(job.seed + 1), trees, blank(by_path), job.setting(0).scene),
+        render(by_path, _chances(job.seed + 1), trees, blank(by_path), job.compiled()),
         total=trees,
         desc="reference",
         file=sys.stderr,
@@ -206,6 +207,7 @@ def _side_by_side(job: Job, methods: Sequence[str], budget: compare.Budget, R: A
 def _list(options: argparse.Namespace) -> Callable[[], int]:
     names = options.scenes or [*SCENES]
     found = {name: opened(name, digest(name)) for name in names}
+    jobs = [] if options.out is None else [Job(name, "path", size=(160, 90)) for name in names]
     if options.out is not None:
         files.check_out(options.out)
 
@@ -217,7 +219,7 @@ def _list(options: argparse.Namespace) -> Callable[[], int]:
         print("methods:")
         for name, method in METHODS.items():
             print(f"  {name:23} {method.words}")
-        return 0 if options.out is None else _thumbnails(names, options.out)
+        return 0 if options.out is None else _thumbnails(jobs, options.out)
 
     return work
 
@@ -231,12 +233,11 @@ def _described(found: Opened) -> str:
     return f"    {made}\n    seen from {at.eye} towards {at.towards}, depth {at.depth}, inset at {at.crop}"
 
 
-def _thumbnails(names: Sequence[str], out: Path, trees: int = 8) -> int:
+def _thumbnails(jobs: Sequence[Job], out: Path, trees: int = 8) -> int:
     """Every scene, 160 x 90 pixels, side by side."""
-    jobs = [Job(name, "path", size=(160, 90)) for name in names]
     shown = []
     for job in tqdm(jobs, unit="scene", file=sys.stderr):
-        *_, last = render(job, _chances(1), trees, blank(job), job.setting(0).scene)
+        *_, last = render(job, _chances(1), trees, blank(job), job.compiled())
         shown.append(files.tone(last.mean, files.exposure(last.mean)))
     shown += [np.ones_like(shown[0])] * (len(shown) > 1 and len(shown) % 2)
     pairs = [np.concatenate(shown[k : k + 2], axis=2) for k in range(0, len(shown), 2)]

@@ -40,7 +40,7 @@ class Row:
 def spend(job: Job, budget: Budget, chances: Chances, clock: Callable[[], float] = time.process_time) -> Iterator[Row]:
     """The row after every frame, until the budget is spent; one frame at least."""
     asked = Counter[str]()
-    scene = counted(job.setting(0).scene, asked)
+    scene = counted(job.compiled(), asked)
     pixels, begun = job.size[0] * job.size[1], clock()
     for picture in render(job, chances, FRAMES, blank(job), scene):
         row = Row(job.method, picture, rays(asked) / pixels, clock() - begun)

@@ -20,6 +20,7 @@ from restir_ref.transport.baselines.restir_di import DEBIASED, direct_light, ind
 from restir_ref.transport.baselines.restir_gi import RadianceIntegrals
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Tracer, radiance, trace
 from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.windows import over_windows, windowed
 from tracer3d.motion import motion, sources
 
 HYBRID = Connectability(0.2, 0.02)
@@ -30,6 +31,9 @@ PRESETS: Mapping[str, Preset] = MappingProxyType({"realtime": REAL_TIME, "offlin
 BLOCK, SIDE = 2**14, 4
 """Paths traced at once, and pixels along a tile of path reuse."""
 
+WINDOW = 2**13
+"""Columns that a pass looks at together: what memory a frame takes beside its reservoirs, and never what it gives."""
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -37,11 +41,20 @@ class Shot:
 
     tracer: Tracer
     chance: Chance
+    window: int = WINDOW
 
     @property
     def pixels(self) -> Array:
         """All pixels, (n,)."""
         return np.arange(self.tracer.sensor.n)
+
+    def over(self, work: Callable[[Tracer, Array, Chance], Array], pixel: Array, step: int = 1) -> Array:
+        """work(tracer, pixel, chance), (C, N), in windows whose sizes are multiples of `step`."""
+
+        def some(at: slice, chance: Chance) -> Array:
+            return work(self.tracer, pixel[at], chance)
+
+        return over_windows(some, len(pixel), self.chance, self.window, step)
 
 
 Frames = Callable[[Iterable[Shot], Preset, Shape], Iterator[Array]]
@@ -75,8 +88,13 @@ def reuse_in_tiles(shots: Iterable[Shot], preset: Preset, shape: Shape) -> Itera
     order = tiles(shape, SIDE)
     for shot in shots:
         image = np.empty((shot.tracer.scene.C, len(order)))
-        image[:, order] = path_reuse(shot.tracer, order, shot.chance, SIDE**2)
+        image[:, order] = shot.over(tiled, order, SIDE**2)
         yield image
+
+
+def tiled(t: Tracer, pixel: Array, chance: Chance) -> Array:
+    """One tree for each of `pixel` (N,), tile by tile, reused by its tile; (C, N)."""
+    return path_reuse(t, pixel, chance, SIDE**2)
 
 
 def resampled(make: Callable[[Tracer], Integrals]) -> Frames:
@@ -86,7 +104,7 @@ def resampled(make: Callable[[Tracer], Integrals]) -> Frames:
         remembered: Memory | None = None
         for shot in shots:
             here, (history, before) = Pixels(make(shot.tracer), shot.pixels), recalled(remembered, shot)
-            X = frame(here, shot.chance, preset, around(preset)(shape), history, before)
+            X = frame(here, shot.chance, preset, around(preset)(shape), history, before, windowed(shot.window))
             yield shade(X, here)
             remembered = kept(preset, shot, here, X)
 
@@ -101,10 +119,14 @@ def resampled_lights(shots: Iterable[Shot], preset: Preset, shape: Shape) -> Ite
         of = light_integrals(t, chance.uniform((t.sensor.numbers, len(shot.pixels))), shot.pixels)
         here, (history, before) = Pixels(of, shot.pixels), recalled(remembered, shot)
         near = around(preset)(shape)(of, here.index, preset.neighbours, preset.radius, chance)
-        X = direct_light(here, near, DEBIASED["talbot"], chance, history, before)
-        tree = trace(t, chance.uniform((t.D, len(shot.pixels))), shot.pixels)
-        yield shade(X, here) + indirect_light(tree)
+        X = direct_light(here, near, DEBIASED["talbot"], chance, history, before, passes=windowed(shot.window))
+        yield shade(X, here) + shot.over(indirect, shot.pixels)
         remembered = kept(preset, shot, here, X)
+
+
+def indirect(t: Tracer, pixel: Array, chance: Chance) -> Array:
+    """What ReSTIR DI does not stand for, from one tree for each of `pixel` (N,); (C, N)."""
+    return indirect_light(trace(t, chance.uniform((t.D, len(pixel))), pixel))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,23 +12,30 @@ from restir_ref.chance import Chance
 from restir_ref.guards import whole
 from restir_ref.transport.paths import Tracer
 from restir_ref.transport.scene import Scene
+from tracer3d.embree import embree, with_embree
 from tracer3d.methods import METHODS, PRESETS, Shot
 from tracer3d.names import known
 from tracer3d.scene_files import digest, opened
 from tracer3d.scenes import Setting
 from tracer3d.sensors import Pinhole
 
-BYTES: Mapping[str, int] = MappingProxyType({"realtime": 12_000, "offline": 18_000})
-"""Memory per pixel of methods that hold a whole frame, by preset: the most that was measured on `cornell`."""
+HELD, LONGER = 1_500, 180
+"""Bytes per pixel of what outlives a window of a pass, and for every scattering vertex more: reservoirs, old and new."""
 
 TRACED = 200
-"""The same for path tracing, which holds some images only."""
+"""Bytes per pixel of path tracing and path reuse, which hold some images only."""
 
 RAY, BESIDE = 3e-8, 30
 """Seconds for asking one surface for one ray, and how many surfaces all else costs as much as; 34 to 5000 measured."""
 
 MOST = 4 * 2**30
 """Bytes that a picture may need."""
+
+SURFACES = 10_000
+"""So many triangles and spheres at most are asked by brute force."""
+
+INTERSECT: Mapping[str, Callable[[Scene], Scene]] = MappingProxyType({"brute": lambda scene: scene, "embree": with_embree})
+"""Who answers what rays meet: all surfaces at once, or a hierarchy of them."""
 
 Chances = Callable[[int], Chance]
 """The chance of every frame by its number."""
@@ -41,7 +48,9 @@ class Job:
     scene  a name, or a file whose name ends in .toml;  content  the file's digest, by which a change of it is noticed
     size   columns and rows;  crop  column and row of the film at which they begin, None for all of the view
     moving  steps of the camera per frame: a picture of a moving camera is its last frame, of a still one the mean
-    Raises ValueError for unknown names, a crop off the film, and pictures that need too much memory.
+    intersect  who answers what rays meet, of `INTERSECT`
+    Raises ValueError for unknown names, a crop off the film, pictures that need too much memory, more surfaces than
+    brute force is for, and where Embree is asked for and not installed.
     """
 
     scene: str
@@ -53,15 +62,17 @@ class Job:
     depth: int | None = None
     seed: int = 1
     content: str | None = None
+    intersect: str = "brute"
 
     def __post_init__(self) -> None:
         if self.content is None:
             object.__setattr__(self, "content", digest(self.scene))
         known(METHODS, self.method, "method")
         known(PRESETS, self.preset, "preset")
+        known(INTERSECT, self.intersect, "way to intersect")
         for count in self.size:
             whole(count, 1, "each side of a picture", "Say --size 64x64.")
-        needed = self.size[0] * self.size[1] * (TRACED if self.method == "path" else BYTES[self.preset])
+        needed = self.size[0] * self.size[1] * self._bytes()
         if needed > MOST:
             raise ValueError(
                 f"a picture of {self.size[0]} x {self.size[1]} pixels by {self.method} needs about "
@@ -70,7 +81,24 @@ class Job:
             )
         if self.method == "path-reuse" and any(count % 4 for count in self.size):
             raise ValueError(f"path reuse needs sides that are multiples of 4, but the size is {self.size}.")
+        surfaces = len(self.setting(0).scene.material)
+        if self.intersect == "brute" and surfaces > SURFACES:
+            raise ValueError(
+                f"{self.scene} has {surfaces:,} triangles and spheres, and brute force is for at most {SURFACES:,}: a "
+                f"frame would take about {self.hours():.2g} hours. Install restir-ref with its extra 'embree', and say "
+                f"--intersect embree."
+            )
+        if self.intersect == "embree":
+            embree()
         self.sensor(0)
+
+    def _bytes(self) -> int:
+        """What a pixel needs while a frame is made."""
+        return TRACED if self.method in ("path", "path-reuse") else HELD + LONGER * self.setting(0).depth
+
+    def compiled(self) -> Scene:
+        """The scene, with who is to answer what rays meet; the same one every time."""
+        return _compiled(self.scene, self.content, self.intersect)
 
     def setting(self, frame: float) -> Setting:
         """The scene as the camera of a frame sees it."""
@@ -78,10 +106,11 @@ class Job:
         return at.at(steps) if steps else at
 
     def hours(self) -> float:
-        """About the time that path tracing of a frame takes: two rays per vertex, each of which asks every surface."""
+        """About the time that path tracing of a frame takes: two rays per vertex; by brute force each asks all surfaces."""
         at = self.setting(0)
         rays = self.size[0] * self.size[1] * PRESETS[self.preset].trees * 2 * at.depth
-        return rays * (len(at.scene.material) + BESIDE) * RAY / 3600
+        asked = len(at.scene.material) if self.intersect == "brute" else 0
+        return rays * (asked + BESIDE) * RAY / 3600
 
     def sensor(self, frame: float) -> Pinhole:
         """The camera of a frame."""
@@ -97,6 +126,11 @@ class Job:
 def _begun(scene: str, content: str | None, depth: int | None) -> Setting:
     at = opened(scene, content).setting
     return at if depth is None else replace(at, depth=depth)
+
+
+@cache
+def _compiled(scene: str, content: str | None, intersect: str) -> Scene:
+    return INTERSECT[intersect](opened(scene, content).setting.scene)
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,5 +121,6 @@ def _height(c: Coincidence, prim: Array, w: Array) -> Array:
 
 def _covers(c: Coincidence, prim: Array, x: Array) -> Array:
     """Whether the facet is there at x, a point of its plane; (N,)."""
-    b = np.einsum("knd,dn->kn", c.maps[:-1].take(prim, axis=1), x) + c.offsets[:-1].take(prim, axis=1)
+    slopes = c.maps[:-1].take(prim, axis=1)
+    b = np.stack([dot(slope.T, x) for slope in slopes]) + c.offsets[:-1].take(prim, axis=1)
     return np.asarray((b >= 0).all(axis=0) & (total([*b]) <= 1))

@@ -124,7 +124,7 @@ def _nearest(s: Matrices, x: Array, w: Array) -> tuple[Array, Array]:
 def _facet_nearness(s: Matrices, x: Array, w: Array) -> Array:
     """1 / t of the crossing with each facet, 0 if it is missed; (S, n)."""
     *b, h = _coordinates(s, x)
-    *back, descent = (s.maps @ -w).reshape(s.d, -1, w.shape[-1])
+    *back, descent = _product(s.maps, -w).reshape(s.d, -1, w.shape[-1])
     h[np.abs(h) <= CLEARANCE * s.extent] = np.inf
     near = np.asarray(descent / h)
     scaled = [b_k * near - back_k for b_k, back_k in zip(b, back, strict=True)]
@@ -136,9 +136,14 @@ def _facet_nearness(s: Matrices, x: Array, w: Array) -> Array:
 
 def _coordinates(s: Matrices, x: Array) -> Array:
     """Coordinates and height of points x in all facets, (d, S, n)."""
-    at = s.maps @ x
+    at = _product(s.maps, x)
     at += s.offsets
     return at.reshape(s.d, -1, x.shape[-1])
+
+
+def _product(maps: Array, x: Array) -> Array:
+    """maps @ x.  Hazard: BLAS rounds a lone column in another way, so it comes with a twin."""
+    return maps @ x if x.shape[-1] != 1 else (maps @ x.repeat(2, axis=-1))[:, :1]
 
 
 def _ball_nearness(s: Matrices, x: Array, w: Array) -> Array:

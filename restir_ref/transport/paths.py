@@ -20,7 +20,7 @@ from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.rays import GRAZING, arrive, emitted, light_pdf, sample_light
 from restir_ref.transport.scene import Scene
-from restir_ref.transport.vectors import norm
+from restir_ref.transport.vectors import dot, norm
 
 
 class Sensor(Protocol):
@@ -193,7 +193,7 @@ def light_leaf(t: Tracer, v: Vertex, P: Array, numbers: tuple[Array, Array]) -> 
     to = light.y - v.x
     r = np.maximum(norm(to), 1e-300)
     w = to / r
-    cos_y = -np.einsum("dn,dn->n", light.n, w)
+    cos_y = -dot(light.n, w)
     f, p_all = mat.evaluate_all(s.materials, s.space, v, P, s.space.to_local(v.n, w))
     seen = (cos_y > GRAZING) & (f > 0).any(axis=0)
     p_light = light.pdf_area * r ** (s.space.d - 1) / np.where(seen, cos_y, 1)

@@ -18,8 +18,8 @@ import numpy as np
 from restir_ref.batch import Array, take
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs, Shifted, target
+from restir_ref.loop import WHOLE, Passes
 from restir_ref.mis import WEIGHTS, Weights
-from restir_ref.restir import initial, spatial, temporal
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import Tracer, Tree, first_hit, leaves
@@ -118,12 +118,14 @@ def direct_light(
     chance: Chance,
     history: Reservoirs | None = None,
     before: Sequence[Pixels] = (),
+    *,
+    passes: Passes = WHOLE,
 ) -> Reservoirs:
     """One frame: candidates, temporal reuse if there is history, spatial reuse; visibility after every pass."""
-    X = lit(initial(here, chance, CANDIDATES), here)
+    X = lit(passes.initial(here, chance, CANDIDATES), here)
     if history is not None:
-        X = lit(temporal(X, here, history, before, chance, mis=mis), here)
-    return lit(spatial(X, here, near, chance, mis=mis), here)
+        X = lit(passes.temporal(X, here, history, before, chance, mis=mis), here)
+    return lit(passes.spatial(X, here, near, chance, mis=mis), here)
 
 
 def light_integrals(t: Tracer, u: Array, pixel: Array) -> LightIntegrals:
