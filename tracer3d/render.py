@@ -34,7 +34,9 @@ MOST = 4 * 2**30
 SURFACES = 10_000
 """So many triangles and spheres at most are asked by brute force."""
 
-INTERSECT: Mapping[str, Callable[[Scene], Scene]] = MappingProxyType({"brute": lambda scene: scene, "embree": with_embree})
+INTERSECT: Mapping[str, Callable[[Scene], Scene]] = MappingProxyType(
+    {"brute": lambda scene: scene, "embree": with_embree}
+)
 """Who answers what rays meet: all surfaces at once, or a hierarchy of them."""
 
 Chances = Callable[[int], Chance]
