@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from figures.experiments.rendering import path_tracing
-from notebooks import frames, one_dimension, shift_mappings, unbiased
+from notebooks import frames, in_space, one_dimension, shift_mappings, unbiased
 from restir_ref import Live, Pixels, Reservoirs, Weights, initial, shade
 from restir_ref.batch import Array, take
 from restir_ref.chance import Chance
@@ -25,6 +25,8 @@ from restir_ref.transport.proofs.reading import ExtendedPath, extended_path, fac
 from restir_ref.transport.proofs.shift_checks import Effort
 from restir_ref.transport.shifts import shift_path
 from toy1d import Line, two_pixels
+from tracer3d import SCENES, Pinhole
+from tracer3d.motion import motion
 
 SEED = 1
 ERRORS = 4
@@ -236,7 +238,27 @@ def film(mine: OneFrame, T: int = 8) -> str:
     return right(f"confidence {c:g}; the error is {error:.2f} of that of one path tree.")
 
 
+# ---------------------------------------------------------------- 06: motion vectors
+
+Places = Callable[[Array, Pinhole], Array]
+
+
+def motion_vector(mine: Places, steps: int = 4) -> str:
+    """Whether mine(x, before) says for points x (3, n) which pixel (n,) of the crop of camera `before` showed them."""
+    setting = SCENES["cornell"]()
+    now, before = (in_space.inset(setting.at(k)) for k in (0, -steps))
+    m = motion(setting.scene, now, before)
+    found = np.asarray(mine(m.x, before))
+    if found.shape != (now.n,):
+        raise ValueError(f"return a pixel for each of the {now.n} points, not an array of shape {found.shape}.")
+    wrong = ~(found == m.source)
+    if wrong.any():
+        return not_yet(f"{wrong.sum()} of {now.n} points were in another pixel, or the nearest one of the crop is.")
+    return right(f"those are the motion vectors; of {m.seen.mean():.0%} of the points the history is their own.")
+
+
 CHECKS: Mapping[str, Callable[[Any], str]] = {
-    check.__name__: check for check in (ris, gris_pass, weight, all_outcomes, jacobian, careful_shift, film)
+    check.__name__: check
+    for check in (ris, gris_pass, weight, all_outcomes, jacobian, careful_shift, film, motion_vector)
 }
 """All checks by name."""
