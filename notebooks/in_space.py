@@ -109,7 +109,7 @@ def seen(name: str) -> "Picture":
 
 
 def passes(found: Mapping[str, Array], scene: str) -> "Picture":
-    """Images (C, n) of the inset, one pass after the other, and the reference."""
+    """The inset after one pass and after another, and its reference; images (C, n)."""
     images = {**found, "reference": reference(scene)}
     picture, axes = style.panels(1, len(images), width=2.4, height=2.6)
     for axis, (words, L) in zip(axes[0], images.items(), strict=True):
@@ -196,7 +196,7 @@ def by_methods(setting: Setting, frames: int = 4) -> "Picture":
 
 # ---------------------------------------------------------------- when does reuse pay?
 
-AROUND, KNOWN, TREES, PASSES = 8, 4, (1, 4, 16), 32
+AROUND, KNOWN, TREES, PASSES = 8, 4, (1, 4, 16), 20
 """Columns and rows of a neighbourhood; trees that predict, and that are measured; replicas."""
 
 
@@ -232,7 +232,7 @@ def paying(scene: str, radius: int) -> "Picture":
         M, [found.split.with_reuse(m)[0] / scale for m in M], **style.nth(1, marker="", label="with, predicted")
     )
     axis.loglog(TREES, found.reused / scale, **style.nth(2, ls="", label="with, measured"), markevery=1)
-    words = f"reuse pays up to M* = {found.split.break_even[0]:.3g}"
+    words = f"reuse pays up to M* = {rounded(found.split.break_even[0])}"
     axis.set(xlabel="trees per pixel M", ylabel="variance, of one tree's", title=f"{scene}, radius {radius}: {words}")
     style.below(axis, ncols=3)
     return picture
@@ -245,8 +245,13 @@ def break_even(scenes: tuple[str, ...], radii: tuple[int, ...] = (3,)) -> Table:
         for radius in radii:
             found = pays(scene, radius)
             gains = (f"{gain:.2f}" for gain in found.without / found.reused)
-            rows.append([scene, radius, f"{found.split.break_even[0]:.3g}", *gains])
+            rows.append([scene, radius, rounded(found.split.break_even[0]), *gains])
     return Table(["scene", "radius", f"M*, from {KNOWN} trees", *(f"gain, M = {M}" for M in TREES)], rows)
+
+
+def rounded(x: float) -> str:
+    """Two digits, as that is what so few replicas tell."""
+    return f"{float(f'{x:.2g}'):g}"
 
 
 # ---------------------------------------------------------------- a claim

@@ -78,6 +78,11 @@ WRONG = {
         "clamped": ("(J <= 2) & (J >= 1 / 2), J", "J > 0, np.clip(J, 0.5, 2)"),
     },
     "film": {"no cap": ("cap=20", "cap=1000"), "no neighbours": (NEIGHBOURS, "X")},
+    "motion_vector": {
+        "rounded": ("np.floor(", "np.rint("),
+        "columns first": ("row * before.width + column", "column * before.width + row"),
+        "beyond the border": ("np.clip(column, 0, before.width - 1)", "column"),
+    },
 }
 
 
@@ -95,6 +100,7 @@ NO_NUMBERS = {
     "weight": lambda i, q, c: np.nan * q(i),
     "all_outcomes": lambda index, chance: (index % 3, np.nan * index),
     "jacobian": lambda x, y: np.nan * x.r,
+    "motion_vector": lambda x, before: np.nan * x[0],
 }
 
 
@@ -108,6 +114,13 @@ def test_what_a_function_must_return_is_said():
         ValueError, match=r"return Y and W_Y, two arrays of shape \(40000,\), not of shapes \[\(40000,\)\]"
     ):
         exercises.ris(lambda x, W, p_hat, u: np.ones(40_000))
+
+
+def test_a_pixel_is_asked_for_every_point():
+    with pytest.raises(
+        ValueError, match=r"return a pixel for each of the 1024 points, not an array of shape \(2, 1024\)"
+    ):
+        exercises.motion_vector(lambda x, before: before.project(x))
 
 
 # ---------------------------------------------------------------- questions

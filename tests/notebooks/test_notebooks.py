@@ -49,8 +49,8 @@ def run(path):
 every_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 
 
-def test_there_are_five_notebooks_in_order():
-    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_"]
+def test_there_are_six_notebooks_in_order():
+    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_", "06_"]
 
 
 @every_notebook
@@ -119,3 +119,19 @@ def test_restir_pt_frame_by_frame_tells_the_truth():
     assert (names["Z"].c == 20).all()
     assert "pixels with light" in printed
     assert 0.8 < names["film"].seen[1:].mean() < 1
+
+
+def test_the_3d_tracer_in_ten_minutes_tells_the_truth():
+    names, printed = run(NOTEBOOKS[5])
+    initial, spatial = names["lit"].values()
+    assert 2 * initial < spatial < (names["Z"].W > 0).mean()
+    assert (names["Y"].c == 4).all()
+    assert (names["Z"].c == 20).all()
+    assert 0.8 < names["m"].seen.mean() < 1
+    assert "did you mean 'roughness'?" in names["said"]
+    found = {scene: names["lesson"].pays(scene, 3) for scene in ("cornell", "ajar", "checker", "crease")}
+    assert [scene for scene, each in found.items() if each.split.break_even[0] < 16] == ["checker", "crease"]
+    assert [scene for scene, each in found.items() if each.without[-1] < each.reused[-1]] == ["checker", "crease"]
+    assert all(each.reused[0] < each.without[0] for each in found.values())
+    assert "GRIS-F11b reproduced: " in printed
+    assert "GRIS-F11b refuted: " in printed
