@@ -34,6 +34,7 @@ REAL_TIME = Preset(trees=1, rounds=1, neighbours=3, radius=20, cap=20)
 OFFLINE = Preset(trees=32, rounds=3, neighbours=6, radius=10, cap=np.nan)
 """32 path trees resampled to one, 3 rounds with 6 neighbours within 10 pixels; no temporal reuse, so no cap."""
 
+
 @dataclass(frozen=True)
 class Passes:
     """Who runs the passes of a frame: `restir` itself, or the same over windows of columns (`windows`)."""
@@ -57,6 +58,7 @@ def frame(
     around: Around,
     history: Reservoirs | None = None,
     before: Sequence[Pixels] = (),
+    *,
     passes: Passes = WHOLE,
 ) -> Reservoirs:
     """One frame: initial samples, temporal reuse if there is history, rounds of spatial reuse.
