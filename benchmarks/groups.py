@@ -115,6 +115,7 @@ THEORY = (
     "integrals",
     "guards",
     "loop",
+    "windows",
     "images",
     "gradient",
     "decorrelation",

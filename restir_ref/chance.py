@@ -6,6 +6,7 @@ so the same estimator code yields exact expectations.  For that to work, calls o
 not sit inside branches that depend on sample values: every column makes the same calls.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import Protocol
@@ -29,7 +30,7 @@ class Chance(Protocol):
 class Live:
     """Chance from a NumPy generator: `Live(numpy.random.default_rng(seed))`."""
 
-    rng: np.random.Generator
+    rng: "np.random.Generator | Columns"
 
     def choose(self, weights: Array) -> Array:
         """Invert the running sum of the weights at one uniform number per column.
@@ -47,3 +48,54 @@ class Live:
     def uniform(self, shape: tuple[int, ...]) -> Array:
         """Independent uniform numbers in [0, 1)."""
         return self.rng.random(shape)
+
+
+ROWS = "rows"
+AT_ONCE = 2**16
+"""Numbers that are dropped at once where a generator cannot jump."""
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """A generator of which only the columns `at` of every row of n numbers are seen; drawn[ROWS] counts rows.
+
+    So the columns of a window get the numbers that they would get among all n.
+    """
+
+    rng: np.random.Generator
+    at: slice
+    n: int
+    drawn: Counter[str]
+
+    def random(self, shape: int | tuple[int, ...]) -> Array:
+        """Uniform numbers in [0, 1), (.., columns of the window).  Raises ValueError for rows of another width."""
+        found, width = np.empty(shape), self.at.stop - self.at.start
+        if found.shape[-1:] != (width,):
+            raise ValueError(
+                f"a window of {width} columns was asked for numbers of shape {found.shape}: ask for one per column, "
+                f"with the batch axis last."
+            )
+        for row in found.reshape(-1, width):
+            _jump(self.rng, self.at.start)
+            self.rng.random(out=row)
+            _jump(self.rng, self.n - self.at.stop)
+            self.drawn[ROWS] += 1
+        return found
+
+
+def skip(rng: np.random.Generator, count: int) -> None:
+    """Leave out so many numbers of `random`, and keep the half number that a jump forgets and drawing does not."""
+    bits = rng.bit_generator
+    half = {name: value for name, value in bits.state.items() if name in ("has_uint32", "uinteger")}
+    _jump(rng, count)
+    bits.state = {**bits.state, **half}
+
+
+def _jump(rng: np.random.Generator, count: int) -> None:
+    """At once where a number is one step of the generator; else by drawing."""
+    bits = rng.bit_generator
+    if isinstance(bits, np.random.PCG64 | np.random.PCG64DXSM):
+        bits.advance(count)
+        return
+    for at in range(0, count, AT_ONCE):
+        rng.random(min(AT_ONCE, count - at))

@@ -58,6 +58,7 @@ def frame(
     around: Around,
     history: Reservoirs | None = None,
     before: Sequence[Pixels] = (),
+    *,
     passes: Passes = WHOLE,
 ) -> Reservoirs:
     """One frame: initial samples, temporal reuse if there is history, rounds of spatial reuse.

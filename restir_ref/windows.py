@@ -8,23 +8,18 @@ every window begins where the pass begins, and of each row of numbers takes its 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from restir_ref.batch import Array, Batch, map_leaves, part
-from restir_ref.chance import Chance, Live
+from restir_ref.chance import ROWS, Chance, Columns, Live, skip
 from restir_ref.guards import whole
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import Passes
 from restir_ref.mis import WEIGHTS, Weights
 from restir_ref.resampling import Input, gris
 from restir_ref.restir import M_CAP, capped, initial, reusing
-
-ROWS = "rows"
-AT_ONCE = 2**16
-"""Numbers that are dropped at once where a generator cannot jump."""
 
 
 def windowed(size: int) -> Passes:
@@ -82,8 +77,7 @@ def over_windows(work: Callable[[slice, Chance], Batch], n: int, chance: Chance,
         return work(parts[0], chance)
     if not (isinstance(chance, Live) and isinstance(chance.rng, np.random.Generator)):
         raise TypeError(f"windows jump in the numbers of a generator, so their chance is a Live one, not {chance!r}.")
-    found: Batch | None = None
-    rows = []
+    found, rows = None, []
     for at in parts:
         row = Columns(deepcopy(chance.rng), at, n, drawn := Counter[str]())
         some = _counted_from(at, work, Live(row))
@@ -92,9 +86,8 @@ def over_windows(work: Callable[[slice, Chance], Batch], n: int, chance: Chance,
         _write(found, some, at)
     if min(rows) < max(rows):
         raise ValueError(f"windows drew {rows} rows of numbers, but every column must make the same calls.")
-    _advance(chance.rng, rows[0] * n)
-    assert found is not None
-    return found
+    skip(chance.rng, rows[0] * n)
+    return found  # type: ignore[return-value]
 
 
 def windows(n: int, size: int, step: int = 1) -> Iterator[slice]:
@@ -102,49 +95,6 @@ def windows(n: int, size: int, step: int = 1) -> Iterator[slice]:
     parts = max(n // max(size, step), 1)
     cuts = [n // step * k // parts * step for k in range(parts)]
     yield from (slice(*ends) for ends in pairwise([*cuts, n]))
-
-
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """A generator of which a window sees its columns `at` of every row of n numbers; drawn[ROWS] counts rows."""
-
-    rng: np.random.Generator
-    at: slice
-    n: int
-    drawn: Counter[str]
-
-    def random(self, shape: int | tuple[int, ...]) -> Array:
-        """Uniform numbers in [0, 1), (.., columns of the window)."""
-        found, width = np.empty(shape), self.at.stop - self.at.start
-        if found.shape[-1:] != (width,):
-            raise ValueError(
-                f"a window of {width} columns was asked for numbers of shape {found.shape}: ask for one per column, "
-                f"with the batch axis last."
-            )
-        for row in found.reshape(-1, width):
-            skip(self.rng, self.at.start)
-            self.rng.random(out=row)
-            skip(self.rng, self.n - self.at.stop)
-            self.drawn[ROWS] += 1
-        return found
-
-
-def skip(rng: np.random.Generator, count: int) -> None:
-    """Leave out so many numbers of `random`: by a jump where one number is one step of the generator."""
-    bits = rng.bit_generator
-    if isinstance(bits, np.random.PCG64 | np.random.PCG64DXSM):
-        bits.advance(count)
-        return
-    for at in range(0, count, AT_ONCE):
-        rng.random(min(AT_ONCE, count - at))
-
-
-def _advance(rng: np.random.Generator, count: int) -> None:
-    """`skip`, without losing the half number that a jump forgets and drawing would have kept."""
-    bits = rng.bit_generator
-    kept = {name: value for name, value in bits.state.items() if name in ("has_uint32", "uinteger")}
-    skip(rng, count)
-    bits.state = {**bits.state, **kept}
 
 
 def _cut(pixels: Pixels, at: slice) -> Pixels:

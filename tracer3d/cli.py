@@ -207,9 +207,10 @@ def _side_by_side(job: Job, methods: Sequence[str], budget: compare.Budget, R: A
 def _list(options: argparse.Namespace) -> Callable[[], int]:
     names = options.scenes or [*SCENES]
     found = {name: opened(name, digest(name)) for name in names}
-    jobs = [] if options.out is None else [Job(name, "path", size=(160, 90)) for name in names]
     if options.out is not None:
         files.check_out(options.out)
+        for name in names:
+            _thumbnail(name)
 
     def work() -> int:
         print("scenes:")
@@ -219,7 +220,7 @@ def _list(options: argparse.Namespace) -> Callable[[], int]:
         print("methods:")
         for name, method in METHODS.items():
             print(f"  {name:23} {method.words}")
-        return 0 if options.out is None else _thumbnails(jobs, options.out)
+        return 0 if options.out is None else _thumbnails(names, options.out)
 
     return work
 
@@ -233,10 +234,14 @@ def _described(found: Opened) -> str:
     return f"    {made}\n    seen from {at.eye} towards {at.towards}, depth {at.depth}, inset at {at.crop}"
 
 
-def _thumbnails(jobs: Sequence[Job], out: Path, trees: int = 8) -> int:
-    """Every scene, 160 x 90 pixels, side by side."""
+def _thumbnail(name: str) -> Job:
+    return Job(name, "path", size=(160, 90))
+
+
+def _thumbnails(names: Sequence[str], out: Path, trees: int = 8) -> int:
+    """Every scene, small, side by side."""
     shown = []
-    for job in tqdm(jobs, unit="scene", file=sys.stderr):
+    for job in tqdm([_thumbnail(name) for name in names], unit="scene", file=sys.stderr):
         *_, last = render(job, _chances(1), trees, blank(job), job.compiled())
         shown.append(files.tone(last.mean, files.exposure(last.mean)))
     shown += [np.ones_like(shown[0])] * (len(shown) > 1 and len(shown) % 2)

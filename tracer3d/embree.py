@@ -74,7 +74,7 @@ class Embree:
         _, what = self._first(x, y - x, np.ones(x.shape[-1]), lambda prim, at: self._between(prim, *take((x, y), at)))
         clear, doubt = what == NOTHING, np.flatnonzero(what == DOUBT)
         clear[doubt] = self.brute.visible(x.take(doubt, axis=-1), y.take(doubt, axis=-1))
-        return clear & self.balls.visible(x, y) if self.balls.radii.size else clear
+        return np.asarray(clear & self.balls.visible(x, y)) if self.balls.radii.size else clear
 
     def foremost(self, x: Array, prim: Array, w: Array) -> Array:
         """By the order of the list and by what emits."""

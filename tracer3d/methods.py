@@ -104,7 +104,7 @@ def resampled(make: Callable[[Tracer], Integrals]) -> Frames:
         remembered: Memory | None = None
         for shot in shots:
             here, (history, before) = Pixels(make(shot.tracer), shot.pixels), recalled(remembered, shot)
-            X = frame(here, shot.chance, preset, around(preset)(shape), history, before, windowed(shot.window))
+            X = frame(here, shot.chance, preset, around(preset)(shape), history, before, passes=windowed(shot.window))
             yield shade(X, here)
             remembered = kept(preset, shot, here, X)
 

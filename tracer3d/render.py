@@ -20,7 +20,7 @@ from tracer3d.scenes import Setting
 from tracer3d.sensors import Pinhole
 
 HELD, LONGER = 1_500, 180
-"""Bytes per pixel of what outlives a window of a pass, and for every scattering vertex more: reservoirs, old and new."""
+"""Bytes per pixel of what outlives a window of a pass, and more per vertex: reservoirs, old and new."""
 
 TRACED = 200
 """Bytes per pixel of path tracing and path reuse, which hold some images only."""
@@ -108,7 +108,7 @@ class Job:
         return at.at(steps) if steps else at
 
     def hours(self) -> float:
-        """About the time that path tracing of a frame takes: two rays per vertex; by brute force each asks all surfaces."""
+        """About the time that path tracing of a frame takes: two rays per vertex, by brute force each asks all."""
         at = self.setting(0)
         rays = self.size[0] * self.size[1] * PRESETS[self.preset].trees * 2 * at.depth
         asked = len(at.scene.material) if self.intersect == "brute" else 0

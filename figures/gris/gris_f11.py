@@ -5,7 +5,7 @@ decides where.  On rough boxes the two shifts nearly always connect the same ver
 indirect light, and the reference path tracing with trees of its own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -130,13 +130,13 @@ def longest(a: Arrays, boxes: Boxes) -> int:
 def draw(a: Arrays) -> "Picture":
     """relMSE over frames; path tracing at equal samples, rays and time; error by pixel."""
     picture, axes = style.panels(1, 3, width=3.9, height=3.9)
-    convergence(axes[0, :2], a, FLAT)
+    convergence(axes[0, :2], a, FLAT, tuple(PRICES))
     by_pixel(a, axes[0, 2])
     return picture
 
 
-def convergence(panels: "Sequence[Axes] | Array", a: Arrays, boxes: Boxes) -> None:
-    """relMSE of means of frames, rough boxes on the left."""
+def convergence(panels: "Sequence[Axes] | Array", a: Arrays, boxes: Boxes, shown: Collection[str]) -> None:
+    """relMSE of means of frames, rough boxes on the left; path tracing at the prices that are `shown`."""
     T = 2 ** np.arange(int(np.log2(longest(a, boxes))) + 1)
     for axis, scene, title in zip(panels, (boxes.rough, boxes.glossy), (TITLES.rough, TITLES.glossy), strict=True):
         prices: dict[str, Callable[[int], float]] = {
@@ -144,7 +144,7 @@ def convergence(panels: "Sequence[Axes] | Array", a: Arrays, boxes: Boxes) -> No
             "equal rays": partial(offline.equal_rays, a, scene, "hybrid"),
             "equal time": offline.equal_time,
         }
-        for name, trees in prices.items():
+        for name, trees in ((name, prices[name]) for name in shown):
             curve = [errors(a, scene, offline.traced(a, scene, trees(int(t)))).mean() for t in T]
             axis.loglog(
                 T, curve, **style.look("path tracing", **PRICES[name], label=f"path tracing, {name}"), markevery=1

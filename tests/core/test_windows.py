@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from restir_ref import chance as chances
 from restir_ref import windows
 from restir_ref.batch import Array
-from restir_ref.chance import Chance, Live
+from restir_ref.chance import ROWS, Chance, Columns, Live
 from restir_ref.integrals import NOWHERE, Pixels, Reservoirs
 from restir_ref.loop import OFFLINE, REAL_TIME, WHOLE, Passes, Preset, frame, random_in_row
 from restir_ref.oracle.enumeration import outcomes
-from restir_ref.windows import Columns, over_windows, windowed
+from restir_ref.windows import over_windows, windowed
 from tests.core.lines import bent
 
 KINDS = (np.random.PCG64, np.random.PCG64DXSM, np.random.MT19937, np.random.Philox)
@@ -35,7 +36,7 @@ def two_frames(preset: Preset, passes: Passes, generator: np.random.Generator, m
     if not np.isnan(preset.cap):
         there = here.index % of.n + moved
         before = [Pixels(of, np.where(there < of.n, here.index + moved, NOWHERE))]
-        X = frame(here, chance, preset, random_in_row, X, before, passes)
+        X = frame(here, chance, preset, random_in_row, X, before, passes=passes)
     return [X.x, X.W, X.c, generator.random(3), generator.integers(9, size=5, dtype=np.uint32)]
 
 
@@ -53,7 +54,7 @@ def test_frames_give_the_same_bytes_in_windows_of_any_size(preset, size, moved):
 
 @pytest.mark.parametrize("kind", GENERATORS)
 def test_so_does_every_generator_whether_it_can_jump_or_not(kind, monkeypatch):
-    monkeypatch.setattr(windows, "AT_ONCE", 50)
+    monkeypatch.setattr(chances, "AT_ONCE", 50)
     whole, cut = (two_frames(REAL_TIME, passes, rng(kind)) for passes in (WHOLE, windowed(30)))
     assert same(cut, whole)
 
@@ -70,7 +71,7 @@ class OfItsOwn(Columns):
     """A mistake: a window draws the next numbers of the generator, as a pass on these columns alone would."""
 
     def random(self, shape: int | tuple[int, ...]) -> Array:
-        self.drawn[windows.ROWS] += int(np.prod(shape)) // (self.at.stop - self.at.start)
+        self.drawn[ROWS] += int(np.prod(shape)) // (self.at.stop - self.at.start)
         return self.rng.random(shape)
 
 

@@ -105,7 +105,7 @@ MISTAKES = {
     "a size of nothing": (["crease", "--size", "0x4"], "is 0. Say --size 64x64."),
     "an absurd size": (
         ["crease", "--size", "20000x20000"],
-        "needs about 4470.3 GiB, more than 4, and 1.2 hours a frame",
+        "needs about 827.0 GiB, more than 4, and 1.2 hours a frame",
     ),
     "an absurd size by path": (["crease", "--method", "path", "--size", "20000x20000"], "about 74.5 GiB, more than 4"),
     "a depth of 0": (["crease", "--depth", "0"], "the path depth must be a whole number >= 1, but is 0"),

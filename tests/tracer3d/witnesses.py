@@ -28,8 +28,8 @@ AT_ONCE = 2**14
 def frosted_ball(roughness: float = 0.2, eta: float = 1.5) -> Setting:
     """The room of GlassBall3 with a ball of rough glass, the reflection slightly red, and a larger lamp.
 
-    Rougher glass is too noisy for a budget.  That our lobes are chosen by Fresnel's term at the surface's normal, not at
-    the microfacet's, may be why; it is not tested.
+    Rougher glass is too noisy for a budget.  That our lobes are chosen by Fresnel's term at the surface's normal, not
+    at the microfacet's, may be why; it is not tested.
     """
     glass = [Layer("rough reflection", (1.0, 0.9, 0.8), roughness), Layer("rough transmission", grey(0.9), roughness)]
     facets = [*room(0), *lamp((0.3, 0.3), (0.7, 0.7), 0.99, 8.0)]

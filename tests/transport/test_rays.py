@@ -51,6 +51,26 @@ def test_blocks_of_rays_are_a_matter_of_speed_only(space, monkeypatch):
     assert all((a == b).all() for a, b in zip(whole, (*s.intersect(x, w), s.visible(x, w)), strict=True))
 
 
+def alone_and_among_others(space: Space) -> bool:
+    """Whether rays give the same bytes column by column as all at once."""
+    s, x, w = soup(space, 1), somewhere(space.d, 300, 2), directions(space.d, 300, 3)
+    t, prim = s.intersect(x, w)
+    alone = [s.intersect(x[:, k : k + 1], w[:, k : k + 1]) for k in range(300)]
+    clear = [s.visible(x[:, k : k + 1], w[:, k : k + 1]) for k in range(300)]
+    ours = [np.concatenate(each) for each in (*zip(*alone, strict=True), clear)]
+    return all((a == b).all() for a, b in zip((t, prim, s.visible(x, w)), ours, strict=True))
+
+
+@every_space
+def test_a_lone_column_is_rounded_as_it_is_among_others(space):
+    assert alone_and_among_others(space)
+
+
+def test_if_blas_were_given_lone_columns_it_would_not_be(monkeypatch):
+    monkeypatch.setattr(intersection, "_product", lambda maps, x: maps @ x)
+    assert not all(alone_and_among_others(space) for space in SPACES.values())
+
+
 def blocks(simplices: int, n: int) -> list[slice]:
     return [*intersection.blocks(simplices, n)]
 
