@@ -34,12 +34,12 @@ SHOWN: Mapping[str, str] = MappingProxyType(
         "path": "path tracing",
         "path-reuse": "path reuse",
         "restir-di": "ReSTIR DI + paths",
-        "restir-gi": "ReSTIR GI (biased)",
+        "restir-gi": "ReSTIR GI",
         "restir-pt": "ReSTIR PT, hybrid",
         "restir-pt-reconnection": "... reconnection",
     }
 )
-"""Methods by their columns; replay alone, which nobody would use, is left out."""
+"""Methods by their columns; replay alone, which nobody would use, is left out.  GI is biased where x_2 is glossy."""
 
 SHAPE = 20, 32
 """Rows and columns of a picture; path reuse has tiles of 4 x 4."""
@@ -148,7 +148,7 @@ FIGURE = Figure(
     world="tracer3d",
     source="scenes and cameras of this project, methods of [GRIS 9.3]",
     claims=(),
-    presets={"quick": {"frames": 2, "trees": 96}, "paper": {"frames": 16, "trees": 4104}},
+    presets={"quick": {"frames": 2, "trees": 72}, "paper": {"frames": 16, "trees": 4104}},
     chunks=chunks,
     compute=compute,
     combine=combine,
