@@ -1,7 +1,7 @@
 """When reuse pays, in space: at the edge of a box, rough and glossy.
 
-As in flatland, by the same code.  A neighbour in the plane is rarely as near as in a row, so fewer trees are enough to
-make reuse a loss (`experiments.reuse`).
+As in flatland, by the same code (`experiments.reuse`): one round is a gain there, three rounds within ten pixels need not
+be.
 """
 
 from collections import Counter
