@@ -89,7 +89,7 @@ FIGURE = Figure(
     source="scenes and sensor of this project, after [GRIS 9]",
     claims=(),
     presets={
-        "quick": {"rows": 60, "samples": 24, "paths": 96},
+        "quick": {"rows": 60, "samples": 16, "paths": 96},
         "paper": {"rows": 160, "samples": 1024, "paths": 96},
     },
     chunks=chunks,
