@@ -27,6 +27,8 @@ SCENES, RADII = ("cornell", "glossy_cornell", "ajar"), (6, 10, 30)
 KNOWN, TREES = 4, (1, 4, 8, 32)
 """Trees of the passes that predict, and of those that are measured."""
 OFTEN = OFFLINE.trees
+ROUNDS_LOOK = 3
+"""The look of several rounds, after those of three radii, in every picture."""
 TILE = 8
 """Pixels whose variances are averaged."""
 
@@ -108,7 +110,7 @@ def ratios(axis: "Axes", a: Arrays, scene: str, radii: Sequence[int]) -> None:
         axis.loglog(TREES, once, **style.nth(k, ls="", label=f"radius {radius}, one round"), markevery=1)
     thrice = a[f"{scene}.{OFFLINE.radius}.three"].sum(axis=1) / a[f"{scene}.{OFFLINE.radius}.without"].sum(axis=1)
     words = f"radius {OFFLINE.radius:g}, {OFFLINE.rounds} rounds"
-    axis.loglog(TREES, thrice, **style.nth(len(radii), ls=":", label=words), markevery=1)
+    axis.loglog(TREES, thrice, **style.nth(ROUNDS_LOOK, ls=":", label=words), markevery=1)
     axis.axhline(1, color=style.INK, lw=1, ls="-", marker="", label="no gain, no loss")
     axis.set_xticks([], minor=True)
     axis.set_xticks(TREES, [str(M) for M in TREES])
