@@ -55,7 +55,7 @@ class Split:
     @property
     def break_even(self) -> Array:
         """M*: reuse pays with fewer trees; infinite where it always does."""
-        return np.asarray(ratio(np.maximum(self.sigma2 - self.Q, 0), self.S))
+        return np.where(self.S > 0, ratio(np.maximum(self.sigma2 - self.Q, 0), self.S), np.inf)
 
 
 def split(of: Image, near: Sequence[Array], M: int, replicas: int, chance: Chance) -> Split:

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import indirect, offline, realtime, split_light
 from figures.experiments.references import reference
 from figures.experiments.rendering import means, samples_of_equal_cost
 from figures.experiments.solid import SIDE
 from figures.experiments.views import SIDE as TILE
-from figures.gris.gris_f14 import CORRELATION, LABELS, draw_errors, ranks
+from figures.gris.gris_f14 import CORRELATION, LABELS, draw_errors, of_tiles, ranks
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.metrics import correlation, mape, tile_contrast
@@ -65,34 +64,7 @@ def check(a: Arrays) -> list[Claim]:
     truth = a["reference"]
     error = {method: mape(a[method], truth) for method in LABELS}
     tiles = {method: tile_contrast(in_plane(ranks(a[method] - truth)), TILE, PLANE) for method in LABELS}
-    ours, theirs = (
-        offline.paired(error[one], error[other])
-        for one, other in (("reconnection", "path reuse"), ("path reuse", "path tracing"))
-    )
-    return [
-        Claim(
-            "GRIS-F14",
-            criteria.ratio_below(*ours, 0.6),
-            "MAPE, ReSTIR PT / path reuse, equal rays",
-            counter=criteria.ratio_above(*ours, 1),
-        ),
-        Claim(
-            "GRIS-F14",
-            criteria.ratio_below(*theirs, 1),
-            "MAPE, path reuse / path tracing, equal rays",
-            counter=criteria.ratio_above(*theirs, 1),
-        ),
-        Claim(
-            "GRIS-F14",
-            criteria.above(tiles["path reuse"], 0.2),
-            "path reuse: rank correlation of errors inside minus across borders",
-        ),
-        Claim(
-            "GRIS-F14",
-            criteria.between(tiles["reconnection"], -0.05, 0.05),
-            "ReSTIR PT: rank correlation of errors inside minus across borders",
-        ),
-    ]
+    return of_tiles(error, tiles)
 
 
 def in_plane(errors: Array) -> Array:

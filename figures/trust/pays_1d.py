@@ -54,7 +54,7 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
 
 def draw(a: Arrays) -> "Picture":
     """As in the other worlds, but predictions are exact."""
-    return pictured(a, (NAME,), RADII, in_row)
+    return pictured(a, (NAME,), RADII, in_row, "gain, exact")
 
 
 FIGURE = Figure(

@@ -88,12 +88,17 @@ def draw(a: Arrays) -> "Picture":
     return pictured(a, SCENES, RADII, in_row)
 
 
-def pictured(a: Arrays, scenes: Sequence[str], radii: Sequence[int], tile: Callable[[Array], Array]) -> "Picture":
-    """One panel per scene, and gains on the right; both worlds."""
+FROM_TREES = f"gain predicted from {KNOWN} trees"
+
+
+def pictured(
+    a: Arrays, scenes: Sequence[str], radii: Sequence[int], tile: Callable[[Array], Array], known: str = FROM_TREES
+) -> "Picture":
+    """One panel per scene, and gains on the right, whose prediction is `known` from something; all worlds."""
     picture, axes = style.panels(1, len(scenes) + 1, width=3.2, height=3.9)
     for axis, scene in zip(axes[0], scenes, strict=False):
         ratios(axis, a, scene, radii)
-    scatter(axes[0, -1], {scene: [gains(a, scene, r, tile) for r in radii] for scene in scenes})
+    scatter(axes[0, -1], {scene: [gains(a, scene, r, tile) for r in radii] for scene in scenes}, known)
     return picture
 
 
@@ -121,7 +126,7 @@ def ratios(axis: "Axes", a: Arrays, scene: str, radii: Sequence[int]) -> None:
     style.below(axis, ncols=1)
 
 
-def scatter(axis: "Axes", found: Mapping[str, Sequence[tuple[Array, Array]]]) -> None:
+def scatter(axis: "Axes", found: Mapping[str, Sequence[tuple[Array, Array]]], known: str) -> None:
     """Predicted against measured gains of tiles, 32 trees, all radii."""
     low, high = np.inf, 0.0
     for k, (scene, pairs) in enumerate(found.items()):
@@ -129,7 +134,7 @@ def scatter(axis: "Axes", found: Mapping[str, Sequence[tuple[Array, Array]]]) ->
         axis.loglog(predicted, measured, **style.nth(k, ls="", label=scene, markersize=2.5), markevery=1)
         low, high = min(low, predicted.min(), measured.min()), max(high, predicted.max(), measured.max())
     axis.plot([low, high], [low, high], color=style.GREY, lw=1, ls="-", marker="", label="as predicted")
-    axis.set(xlabel="gain predicted from 4 trees", ylabel="gain measured", title=f"Tiles, {OFTEN} trees, one round")
+    axis.set(xlabel=known, ylabel="gain measured", title=f"Tiles, {OFTEN} trees, one round")
     style.below(axis, ncols=1)
 
 

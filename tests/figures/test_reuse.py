@@ -64,6 +64,11 @@ def test_reuse_pays_below_the_break_even_and_costs_above_it() -> None:
     assert np.all(found.with_reuse(more) > found.without(more))
 
 
+def test_without_noise_of_choosing_reuse_always_pays() -> None:
+    same = reuse.Split(np.ones(2), np.array([0.0, 0.5]), np.zeros(2))
+    assert same.break_even.tolist() == [np.inf, 2]
+
+
 @pytest.mark.parametrize("radius", [6, 15])
 def test_passes_over_four_samples_predict_the_gain_with_thirty_two(radius) -> None:
     line, rng = image_of_64(), np.random.default_rng(5)

@@ -129,6 +129,14 @@ def test_path_reuse_in_squares_has_the_mean_of_path_tracing() -> None:
     assert by_crop == pytest.approx([1, 1], abs=0.08)
 
 
+def test_path_reuse_puts_every_pixel_back_in_its_place() -> None:
+    of = view("CB3", HYBRID, Counter(), setting("CB3").view(16, 8))
+    index, chance = np.arange(8 * of.n), Live(np.random.default_rng(8))
+    black = lattice_tracing(indirect_light)(of, np.arange(of.n), chance) == 0
+    assert 10 < black.sum() < of.n - 10
+    assert not offline.reused(of, index, chance).reshape(8, of.n)[:, black].any()
+
+
 def test_a_lattice_in_blocks_is_one_in_a_row_to_the_bit(monkeypatch) -> None:
     of = view("cornell", HYBRID, Counter())
     whole = lattice_tracing()(of, np.arange(8), Live(np.random.default_rng(5)))
