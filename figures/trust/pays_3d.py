@@ -1,7 +1,7 @@
 """When reuse pays, in space: at the edge of a box, rough and glossy.
 
-As in flatland, by the same code (`experiments.reuse`): one round is a gain there, three rounds within ten pixels need
-not be.
+As in flatland, by the same code (`experiments.reuse`).  The quick preset has too few replicas to tell single tiles of
+the glossy box; the sums over pixels are what it shows.
 """
 
 from collections import Counter
