@@ -71,7 +71,7 @@ Source = tuple[Array, Array]
 
 
 def overlapped(shape: Sequence[int], by: Array, index: Array) -> list[Source]:
-    """The previous pixels that the squares pixel + by of columns `index` overlap, two along every axis of the film.
+    """The previous pixels that the squares pixel + by of columns `index` overlap, at most two along every axis.
 
     shape is that of the image (rows, columns) or (n,); by (film, n) counts along the last axis first.  What is not in
     the image has no column: it was not seen, or by somebody else.
@@ -92,7 +92,8 @@ def overlapped(shape: Sequence[int], by: Array, index: Array) -> list[Source]:
         share = np.where(np.array(each)[:, None] == 1, by - corner, 1 - (by - corner)).prod(axis=0)
         inside = ((place + step >= 0) & (place + step < extents[:, None])).all(axis=0)
         there = inside & known & (share > 0)
-        found.append((np.where(there, index + (step * strides[:, None]).sum(axis=0), NOWHERE), share))
+        if there.any():
+            found.append((np.where(there, index + (step * strides[:, None]).sum(axis=0), NOWHERE), share))
     return found
 
 
