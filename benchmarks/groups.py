@@ -118,6 +118,8 @@ THEORY = (
     "windows",
     "images",
     "gradient",
+    "poisson",
+    "poisson_l1",
     "decorrelation",
     "metrics",
     "counting",

@@ -111,7 +111,7 @@ def _along(shape: tuple[int, ...], k: int) -> Any:
     n = shape[-1 - k]
     factors: list[Any] = [sp.eye_array(m) for m in shape]
     factors[-1 - k] = sp.eye_array(n - 1, n, k=1) - sp.eye_array(n - 1, n)
-    return reduce(sp.kron, factors)  # type: ignore[arg-type]  # overloaded
+    return reduce(sp.kron, factors)
 
 
 def l2(
