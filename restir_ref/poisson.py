@@ -214,7 +214,8 @@ def _finite(values: Array, what: str, dimensions: int) -> None:
 def _forward(g: Array, own: Array, name: str) -> None:
     """Raise ValueError for a gradient that points against the image's own differences.
 
-    E[sum g grad I_prim] = |grad I|^2 >= 0 for noise that is independent, and more for noise that is shared.
+    E[sum g grad I_prim] = |grad I|^2 >= 0 for noise that is independent, and more for noise that is shared.  Many
+    differences must speak: an image that is flat but for one or two edges is never doubted.
     """
     along = (g * own).ravel()
     size = np.sqrt(along @ along)

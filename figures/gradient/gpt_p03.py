@@ -257,6 +257,7 @@ def outliers(a: Arrays) -> list[Claim]:
     return [
         Claim("GPT-P05", criteria.ratio_below(row_l1, row_l2, 1), "1D: error of L1 / L2"),
         Claim("GPT-P05", criteria.ratio_above(row_l2, row, 1), "1D: error of L2 / primal"),
+        Claim("GPT-P05", criteria.reported(criteria.ratio_interval(row_l1, row)[2]), "1D: error of L1 / primal"),
         Claim("GPT-P05", criteria.ratio_below(image_l1, image_l2, 0.3), "2D: error of L1 / L2"),
         Claim("GPT-C03", far, "2D with outliers: error of L1 / L2", caveat=ON_TI),
     ]

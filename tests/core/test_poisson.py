@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from scipy.fft import fftn, ifftn
 
-from restir_ref.batch import Array
+from restir_ref.batch import Array, total
+from restir_ref.integrals import Pixels
+from restir_ref.oracle.laws import expected_sum
+from restir_ref.oracle.scenes import three_pixel_scene
 from restir_ref.poisson import (
     by_elimination,
     by_transform,
@@ -21,6 +24,8 @@ from restir_ref.poisson import (
     transposed,
 )
 from restir_ref.poisson_l1 import l1
+from restir_ref.restir import initial, shade
+from tests.oracle.pairs import ENDS, both_signs, true_means
 
 SHAPES = {"row": (9,), "image": (5, 7), "one row": (1, 8), "one column": (6, 1)}
 every_shape = pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
@@ -85,7 +90,27 @@ def test_differences_of_pairs_are_turned_round():
     assert l2(I, *forward(*deltas)) == pytest.approx(I, abs=1e-12)
 
 
-@pytest.mark.claims("GPT-E01", part="control: a flipped sign, on test images", world="flatland2d")
+def expected_deltas() -> tuple[Array, Array]:
+    """The three pixels of a finite scene, and E of what pairs (0, 1) and (1, 2) estimate, by enumeration."""
+    scene = three_pixel_scene()
+
+    def program(index, chance) -> Array:
+        parts = both_signs(scene.now, ENDS)
+        return total([shade(initial(Pixels(part, index), chance), Pixels(part, index)) for part in parts])
+
+    return true_means(scene), expected_sum(program, 2)[0]
+
+
+def test_what_pairs_estimate_turned_round_gives_the_row_in_expectation():
+    I, deltas = expected_deltas()
+    assert l2(I, *forward(deltas)) == pytest.approx(I, rel=1e-12)
+
+
+def test_what_pairs_estimate_as_it_is_is_noticed():
+    I, deltas = expected_deltas()
+    assert abs(l2(I, deltas) / I - 1).max() > 0.1
+
+
 @every_shape
 def test_gradients_of_the_other_sign_make_it_worse_than_the_primal(shape):
     I, primal, G = noisy(shape, s_c=0.01, s_g=0.001)
