@@ -305,7 +305,7 @@ def draw_gain(axis: "Axes", a: Arrays) -> None:
         axis.plot(x, [closed_form(ratio, d) for ratio in x], **style.nth(k, marker="", label=label))
         measured = a[f"white {name} l2"].mean(axis=0) / a[f"white {name} primal"].mean()
         axis.plot(RATIOS, measured, **style.nth(k, ls=""), markevery=1)
-    axis.axhline(1, color=style.GREY, lw=1)
+    axis.axhline(1, color=style.GREY, lw=1, label="neither gain nor loss")
     axis.set(
         xscale="log",
         yscale="log",
@@ -313,7 +313,7 @@ def draw_gain(axis: "Axes", a: Arrays) -> None:
         ylabel="variance of L2 / primal",
         title="Gradients gain more in images",
     )
-    axis.set_ylim(top=30)
+    axis.set_ylim(top=60)
     axis.legend(loc="upper left")
 
 
