@@ -186,6 +186,13 @@ def test_inputs_stay_as_they_are_and_whole_numbers_will_do():
     assert dx.tolist() == [1, 2]
 
 
+def test_short_numbers_are_reckoned_with_in_64_bits():
+    _, primal, G = noisy((5, 7))
+    short = [each.astype(np.float32) for each in (primal, *G)]
+    assert np.array_equal(l2(*short), l2(*(each.astype(float) for each in short)))
+    assert l2(np.array([3, 1], dtype=np.uint8), np.array([-2], dtype=np.int8)) == pytest.approx([3, 1], abs=1e-12)
+
+
 # ---------------------------------------------------------------- linear, so unbiased
 
 
@@ -270,6 +277,7 @@ def test_the_spectrum_of_white_noise_is_flat_and_its_mean_is_that_of_the_squares
     e = rng().standard_normal((4, 6, 5))
     assert cosine_power(e).mean(axis=(-2, -1)) == pytest.approx((e**2).mean(axis=(-2, -1)), rel=1e-12)
     assert cosine_power(np.eye(30).reshape(-1, 6, 5)).sum(axis=0) == pytest.approx(1, rel=1e-12)
+    assert cosine_power(np.ones((6, 5))) == pytest.approx(30 * (np.arange(30) == 0).reshape(6, 5), abs=1e-12)
 
 
 # ---------------------------------------------------------------- what is refused
@@ -339,6 +347,22 @@ def test_the_sign_of_right_gradients_is_never_doubted_however_noisy():
         l2(dice.standard_normal(flat.shape), *(dice.standard_normal(g.shape) for g in differences(flat)))
     l2(flat, *differences(flat))
     l2(picture(20, 30), *differences(flat))
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_the_other_sign_is_refused_from_six_standard_errors_on(unit):
+    def turned(differences_: int) -> Array:
+        zigzag = unit * (np.arange(differences_ + 1) % 2)
+        return l2(zigzag, -np.diff(zigzag))
+
+    assert np.isfinite(turned(36)).all()
+    with pytest.raises(ValueError, match=r"by 6\.1 standard errors"):
+        turned(37)
+
+
+def test_of_several_bad_numbers_the_first_is_named():
+    with pytest.raises(ValueError, match=r"primal image is inf in column 2 \(2 of 5 values are not finite\)"):
+        l2(np.array([0, 1, np.inf, 2, np.nan]), np.zeros(4))
 
 
 def test_one_outlier_against_the_image_is_no_other_sign():

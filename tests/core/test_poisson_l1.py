@@ -1,6 +1,7 @@
 """Laws of L1 reconstruction: a linear program says how small the norm can be; outliers in rows and in images."""
 
 from collections.abc import Iterable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -24,10 +25,10 @@ def with_outliers(shape: tuple[int, ...], leading: tuple[int, ...] = (), seed: i
     return I + 0.3 * dice.standard_normal(I.shape), [g + w for g, w in zip(G, wrong, strict=True)]
 
 
-def least(primal: Array, G: list[Array]) -> float:
+def least(primal: Array, G: list[Array], alpha: float) -> float:
     """The minimum of the norm: min sum t with -t <= A I - b <= t."""
-    A = sp.vstack([ALPHA * sp.eye_array(primal.size), gradient_matrix(primal.shape)])
-    b = np.concatenate([ALPHA * primal.ravel(), *(g.ravel() for g in G)])
+    A = sp.vstack([alpha * sp.eye_array(primal.size), gradient_matrix(primal.shape)])
+    b = np.concatenate([alpha * primal.ravel(), *(g.ravel() for g in G)])
     m, n = A.shape
     t = sp.eye_array(m)
     found = linprog(
@@ -39,22 +40,43 @@ def least(primal: Array, G: list[Array]) -> float:
     return float(found.fun)
 
 
-def excess(reconstruct, shape: tuple[int, ...]) -> float:
+def excess(reconstruct, shape: tuple[int, ...], alpha: float = ALPHA) -> float:
     """By how much the norm is above its minimum, relative to it."""
     primal, G = with_outliers(shape)
-    return float(l1_norm(reconstruct(primal, *G), primal, *G)) / least(primal, G) - 1
+    norm = l1_norm(reconstruct(primal, *G, alpha=alpha), primal, *G, alpha=alpha)
+    return float(norm) / least(primal, G, alpha) - 1
 
 
 @pytest.mark.claims("GPT-A11", part="L1 against a linear program")
+@pytest.mark.parametrize("alpha", [ALPHA, 0.7])
 @every_shape
-def test_the_norm_is_the_least_that_a_linear_program_finds(shape):
-    assert -1e-9 < excess(l1, shape) < 1e-3
+def test_the_norm_is_the_least_that_a_linear_program_finds(shape, alpha):
+    assert -1e-9 < excess(l1, shape, alpha) < 1e-3
 
 
 @every_shape
 def test_the_norm_of_the_l2_image_and_of_weights_that_froze_is_noticed(shape):
     assert excess(l2, shape) > 0.1
-    assert excess(lambda *inputs: l1(*inputs, rounds=3), shape) > 1e-3
+    assert excess(partial(l1, rounds=3), shape) > 1e-3
+
+
+@every_shape
+def test_the_first_round_weighs_by_the_residuals_of_l2_beside_their_mean(shape):
+    primal, G = with_outliers(shape)
+    A = np.vstack([0.5 * np.eye(primal.size), gradient_matrix(shape).toarray()])
+    b = np.concatenate([0.5 * primal.ravel(), *(g.ravel() for g in G)])
+    r = A @ np.linalg.solve(A.T @ A, A.T @ b) - b
+    w = 1 / np.sqrt(r**2 + abs(r).mean() ** 2)
+    exact = np.linalg.solve(A.T @ (w[:, None] * A), A.T @ (w * b))
+    assert l1(primal, *G, alpha=0.5, rounds=1).ravel() == pytest.approx(exact, abs=1e-4)
+    assert abs(l1(primal, *G, alpha=0.5, rounds=2).ravel() - exact).max() > 1e-2
+
+
+def test_the_norm_of_a_stack_is_that_of_every_image():
+    primal, G = with_outliers((8, 9), (2, 3))
+    norms = l1_norm(primal, primal, *G)
+    assert norms.shape == (2, 3)
+    assert norms[1, 2] == pytest.approx(l1_norm(primal[1, 2], primal[1, 2], *(g[1, 2] for g in G)), rel=1e-12)
 
 
 @every_shape
