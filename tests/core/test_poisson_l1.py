@@ -10,8 +10,8 @@ from scipy.optimize import linprog
 from tqdm import tqdm
 
 from restir_ref.batch import Array
-from restir_ref.poisson import ALPHA, differences, gradient_matrix, l2
-from restir_ref.poisson_l1 import ROUNDS, l1, l1_norm, normal_equations, weighted
+from restir_ref.poisson import ALPHA, by_transform, differences, gradient_matrix, l2
+from restir_ref.poisson_l1 import ROUNDS, TOLERANCE, conjugate_gradients, l1, l1_norm, normal_equations, weighted
 
 SHAPES = {"row": (24,), "image": (8, 9)}
 every_shape = pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
@@ -93,6 +93,34 @@ def test_a_reweighted_step_solves_its_normal_equations(shape):
         abs(weighted(np.zeros(shape), primal, G, w[:1] + [0.5 * each for each in w[1:]]).ravel() - exact).max() > 0.01
     )
     assert normal_equations(primal, G, w)[2].ravel() == pytest.approx(np.diag(A.T @ (W[:, None] * A)), rel=1e-12)
+
+
+def solved(precondition) -> tuple[Array, float, int]:
+    """What conjugate gradients find, its residual squared over that of zero, and how many products they took."""
+    primal, G = with_outliers((8, 9))
+    product, b, _ = normal_equations(primal, G, [np.ones(each.shape) for each in (primal, *G)])
+    asked: list[int] = []
+
+    def counted(v: Array) -> Array:
+        asked.append(1)
+        return product(v)
+
+    x = conjugate_gradients(counted, b, np.zeros(b.shape), precondition, (-2, -1))
+    r = b - product(x)
+    return x, float((r * precondition(r)).sum() / (b * precondition(b)).sum()), len(asked)
+
+
+def test_the_inverse_as_a_preconditioner_needs_one_step():
+    primal, G = with_outliers((8, 9))
+    x, _, products = solved(by_transform((8, 9)))
+    assert x == pytest.approx(l2(primal, *G), abs=1e-10)
+    assert products == 2
+
+
+def test_steps_end_where_the_residual_is_small_enough_and_not_long_after():
+    _, residual, products = solved(lambda r: r / 4)
+    assert 1e-4 * TOLERANCE**2 < residual <= TOLERANCE**2
+    assert products > 10
 
 
 # ---------------------------------------------------------------- medians
