@@ -146,6 +146,10 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
         "after": Look(ORANGE, "s", "--", "//"),
         "with": Look(BLUE, "o", "-", ""),
         "positivized": Look(INK, "^", "-.", ".."),
+        # reconstructions
+        "primal": Look(ORANGE, "s", "--", "//"),
+        "L2": Look(BLUE, "o", "-", ""),
+        "L1": Look(INK, "^", "-.", ".."),
         # mutations
         "right": Look(BLUE, "o", "-", ""),
         "W inverted": Look(ORANGE, "s", "--", ""),
