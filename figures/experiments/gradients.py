@@ -7,7 +7,7 @@ measured: a twentieth of a unit around a corner or an edge that the scene has.
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -45,9 +45,9 @@ from restir_ref.transport.restir_pt import PathIntegrals, ScatteredIntegrals
 from restir_ref.transport.scene import Scene
 
 MAPS: Mapping[str, tuple[float, float]] = MappingProxyType(
-    {"occluders": (0.5, 0.45), "ajar": (0.98, 0.33), "checker": (0.5, 0.025)}
+    {"occluders": (0.5, 0.45), "ajar": (0.98, 0.33), "checker": (0.5, 0.025), "rack": (0.48, 0.6)}
 )
-"""Middles of the crops of maps: the corner of a post, the slit of the door, two squares of the floor."""
+"""Middles of the crops of maps: the corner of a post, the slit of the door, two squares of the floor, a bar's end."""
 
 CROP, SIDE = 0.05, 24
 """Width of a crop of a map, in units of length, and its pixels along a side."""
@@ -147,12 +147,14 @@ def with_restir(
     return found | {"rays": np.array((rays(asked) - spent) / (replicas * view[PRIMAL].n) + MOTION_RAYS)}
 
 
-def after_restir(views: Sequence[View], asked: Counter[str], replicas: int, chance: Chance) -> Arrays:
+def after_restir(
+    views: Sequence[View], asked: Counter[str], replicas: int, chance: Chance, preset: GradientPreset = GRADIENT
+) -> Arrays:
     """Gradient after ReSTIR: the image's own samples shifted to their neighbours.  [GPT 4.1]"""
     spent, last = 0, None
     for view in views:
         spent, alone = rays(asked), {PRIMAL: view[PRIMAL]}
-        last = alone, step(alone, chance, GRADIENT, replicas, last)
+        last = alone, step(alone, chance, preset, replicas, last)
     view, X = views[-1], last[1][PRIMAL][PRIMAL]  # type: ignore[index]
     return differences(view, X, replicas) | {
         "rays": np.array((rays(asked) - spent) / (replicas * view[PRIMAL].n) + MOTION_RAYS)
@@ -179,6 +181,12 @@ def differences(view: View, X: Reservoirs, replicas: int) -> Arrays:
 def grey(estimates: Array, replicas: int) -> Array:
     """The mean over channels, (replicas, n)."""
     return np.asarray(estimates.mean(axis=0).reshape(replicas, -1))
+
+
+def temporal_only(views: Sequence[View], asked: Counter[str], replicas: int, chance: Chance) -> Arrays:
+    """The same with a history and no neighbours, which in easy places is the better image."""
+    alone = replace(GRADIENT, pixels=replace(GRADIENT.pixels, rounds=0))
+    return after_restir(views, asked, replicas, chance, alone)
 
 
 Method = Callable[[Sequence[View], Counter[str], int, Chance], Arrays]
@@ -208,6 +216,15 @@ def inner(name: str, key: str, images: Array) -> Array:
 
 
 # ---------------------------------------------------------------- errors
+
+
+def spread(parts: Sequence[Array]) -> Array:
+    """Squared distance from the mean over replicas of every one, whose mean is the variance; (R,).
+
+    Of unbiased estimates (R, n) in every direction it is the expected squared error, and needs no reference.
+    """
+    R = len(parts[0])
+    return np.asarray(sum(((each - each.mean(axis=0)) ** 2).mean(axis=-1) for each in parts) * R / (R - 1))
 
 
 def true_differences(scene: str) -> Array:

@@ -143,7 +143,7 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
         # pixels of a pair, and their difference
         "$f_1$": Look(GREEN, "v", "-", ""),
         "$f_2$": Look(PURPLE, "P", "--", ""),
-        "after": Look(ORANGE, "s", "--", "//"),
+        "after": Look(VERMILLION, "D", "--", "xx"),
         "with": Look(BLUE, "o", "-", ""),
         "positivized": Look(INK, "^", "-.", ".."),
         # reconstructions
