@@ -45,7 +45,8 @@ def unlike(g: Seen, i: Array, j: Array) -> Array:
     """Whether pixels i and j (N,) see different things: an edge, if they are neighbours; (N,).  [GPT 4.3.2]"""
     colour, turn, depth = THRESHOLDS
     t_i, t_j = g.t[i], g.t[j]
-    apart = (t_i != t_j) & ~(np.abs(t_i - t_j) <= depth * np.where(np.isfinite(t_i), t_i, 0))
+    met, both = np.isfinite(t_i) == np.isfinite(t_j), np.isfinite(t_i) & np.isfinite(t_j)
+    apart = ~met | (both & (np.abs(np.where(both, t_i, 0) - np.where(both, t_j, 0)) > depth * t_i))
     return np.asarray((np.abs(g.albedo[i] - g.albedo[j]) > colour) | (dot(g.n[:, i], g.n[:, j]) < turn) | apart)
 
 
