@@ -1,7 +1,7 @@
 """GPT Fig. 6 and 10: which pairs reuse in space, and whom they ask.
 
 The whole floor of squares in 480 pixels, so that it has borders to align with, and the whole row of posts, under a
-camera that moves by a third of a pixel per frame.  Arms share everything but the spatial reuse of pairs: none; all pairs with
+camera that moves by a third of a pixel per frame.  Arms differ in the spatial reuse of pairs: none; all pairs with
 random neighbours; edge pairs alone, with neighbours that are edges of the same kind.  All are unbiased, so that the
 variance of dx over replicas is their squared error.  Radii are those of a film of 1920 pixels, 20 of which are 5 here;
 the paper leaves the window of the search for alike pairs open, which is 64 pixels here.
