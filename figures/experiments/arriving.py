@@ -20,6 +20,7 @@ from figures.experiments.views import HYBRID, setting, standard, view
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.transport.baselines.restir_di import indirect_light
+from restir_ref.transport.paths import Tree, radiance
 from restir_ref.transport.rays import arrive
 from restir_ref.transport.restir_pt import PathIntegrals
 from tracer3d.scenes import Setting
@@ -94,13 +95,15 @@ def trees(scene: str, last: Mosaic, count: int, rng: np.random.Generator) -> Arr
 # ---------------------------------------------------------------- truth
 
 
-def direct_truth(scene: str, last: Mosaic, rng: np.random.Generator) -> Arrays:
-    """Direct light and what lamps show of themselves, (n,), by a lattice of paths with one scattering event.
+def direct_light(tree: Tree) -> Array:
+    """What ReSTIR DI stands for, (C, N)."""
+    return np.asarray(radiance(tree) - indirect_light(tree))
 
-    Only where no lobe is a delta: light that such a one mirrors is not ReSTIR DI's.
-    """
+
+def direct_truth(scene: str, last: Mosaic, rng: np.random.Generator) -> Arrays:
+    """The image of `direct_light`, (n,), by a lattice of paths with one scattering event."""
     t = replace(view(scene, HYBRID, Counter(), last).tracer, depth=1)
-    return {"images": lattice_tracing()(PathIntegrals(t), np.arange(last.n), Live(rng))}
+    return {"images": lattice_tracing(direct_light)(PathIntegrals(t), np.arange(last.n), Live(rng))}
 
 
 def truth(scene: str, wide: int, direct: Array) -> Array:

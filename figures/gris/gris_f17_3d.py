@@ -1,0 +1,174 @@
+"""GRIS Fig. 17 in space: rays to the error of 1024 path trees, by path reuse and by ReSTIR PT with both shifts.
+
+As in flatland, by the same code: offline frames, indirect light.  Views are five crops of the film in four scenes, and
+an inset of two glossy boxes that mirror each other.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from figures.claims import criteria
+from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
+from figures.experiments import arriving, offline
+from figures.experiments.references import INDIRECT, reference
+from figures.gris.gris_f17 import METHODS, SAME_TIME, SHIFTS, TARGET, curve, in_words, rays_to
+from figures.report import style
+from restir_ref.batch import Array
+from restir_ref.metrics import mape
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Picture
+
+VIEWS = ("CB3", "CB3-glossy", "CB3-glossy, box", "Ajar3", "GlassBall3")
+STORED = VIEWS[:3]
+"""Views whose indirect light has a reference; of the others, that of all light and direct light's truth say it."""
+
+TRUTH = "truth of direct light"
+
+
+def chunks(preset: Any) -> Sequence[dict[str, str]]:
+    """Every view of the preset and method; and direct light where it is needed."""
+    views = preset["views"]
+    return offline.chunks(views, METHODS) + [{"scene": each, "light": TRUTH} for each in views if each not in STORED]
+
+
+def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
+    """Independent images (count, n) and rays per pixel of one; or direct light (n,)."""
+    scene = chunk["scene"]
+    sensor = arriving.seen(scene, preset["wide"])
+    if "light" in chunk:
+        return arriving.direct_truth(scene, sensor, rng)
+    return offline.render(offline.METHODS[chunk["method"]], scene, preset[chunk["method"]], rng, sensor)
+
+
+def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
+    """Rays and MAPE of means over frames, "view.method.curve" (2, T); of TARGET trees, "view.target" (2,)."""
+    found = {tuple(chunk.values()): part for chunk, part in zip(chunks(preset), results, strict=True)}
+    arrays: Arrays = {}
+    for view in preset["views"]:
+        images: Arrays = {f"{view}.reference": truth(preset, view, found)}
+        for method in METHODS:
+            images |= {f"{view}.{method}.{key}": value for key, value in found[view, method].items()}
+            arrays[f"{view}.{method}.curve"] = np.stack(curve(images, view, method))
+        error = mape(offline.traced(images, view, TARGET), images[f"{view}.reference"]).mean()
+        arrays[f"{view}.target"] = np.array([TARGET * float(found[view, PT]["rays"]) / offline.UNIT, error])
+    return arrays
+
+
+PT = METHODS[0]
+
+
+def truth(preset: Any, view: str, found: Mapping[tuple[str, ...], Arrays]) -> Array:
+    """Indirect light, (n,)."""
+    if view in STORED:
+        return arriving.middle(view, reference(view, INDIRECT).mean, preset["wide"])
+    return reference(view).mean - found[view, TRUTH]["images"]
+
+
+# ---------------------------------------------------------------- verdicts
+
+
+def speedups(a: Arrays, method: str) -> dict[str, float]:
+    """Rays of TARGET path trees over those of a method with the same MAPE, by view."""
+    found = {}
+    for view in (each for each in VIEWS if f"{each}.target" in a):
+        cost, error = a[f"{view}.target"]
+        found[view] = float(cost) / rays_to(float(error), *a[f"{view}.{method}.curve"])
+    return found
+
+
+def check(a: Arrays) -> list[Claim]:
+    """Best speedups, as in flatland, and beside them those of every view."""
+    all_of = {method: speedups(a, method) for method in METHODS[1:]}
+    best = {method: max(each.values()) for method, each in all_of.items()}
+    claims = []
+    for method in SHIFTS:
+        (where,) = (view for view, speedup in all_of[method].items() if speedup == best[method])
+        fast = criteria.above(best[method], 3), criteria.above(best[method] / best["path reuse"], 1)
+        for outcome, what in zip(fast, ("in rays of path tracing", "over that of path reuse"), strict=True):
+            claims.append(Claim("GRIS-F17", outcome, f"{method}: best speedup {what}", reason=f"In {where}."))
+    return claims + [
+        Claim("GRIS-F17", criteria.reported(in_words(each)), f"{method}: speedup view by view")
+        for method, each in all_of.items()
+    ]
+
+
+# ---------------------------------------------------------------- picture
+
+
+def draw(a: Arrays) -> "Picture":
+    """MAPE over rays in every view, and speedups."""
+    views = [each for each in VIEWS if f"{each}.target" in a]
+    columns = (len(views) + 2) // 2 if len(views) > 1 else 2
+    rows = -(-(len(views) + 1) // columns)
+    picture, axes = style.panels(rows, columns, width=3.4, height=3.0)
+    for axis, view in zip(axes.ravel(), views, strict=False):
+        for method in METHODS:
+            axis.loglog(*a[f"{view}.{method}.curve"], **style.look(method))
+        axis.axvline(same_time(a, view), color=style.GREY, lw=1, ls=":", marker="", label=SAME_TIME)
+        axis.set(xlabel="rays per pixel", ylabel="MAPE", title=view)
+    picture.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    _bars(axes.ravel()[len(views)], a, views)
+    for axis in axes.ravel()[len(views) + 1 :]:
+        axis.set_axis_off()
+    return picture
+
+
+def same_time(a: Arrays, view: str) -> float:
+    """Rays of as many path trees as take the time of a frame."""
+    return offline.equal_time(1) * float(a[f"{view}.target"][0]) / TARGET
+
+
+def _bars(axis: "Axes", a: Arrays, views: Sequence[str]) -> None:
+    for k, method in enumerate(METHODS[1:]):
+        axis.bar(np.arange(len(views)) + 0.27 * (k - 1), list(speedups(a, method).values()), 0.25, **style.bar(method))
+    axis.axhline(1, color=style.INK, lw=1, ls=":", label="as path tracing")
+    axis.set_yscale("log")
+    axis.set_xticks(range(len(views)), [view.replace(", ", ",\n").replace("-", "-\n") for view in views])
+    axis.set(ylabel="rays of path tracing / rays", title=f"To the MAPE of {TARGET} trees")
+    axis.grid(visible=False, axis="x")
+    style.below(axis, ncols=2)
+
+
+FIGURE = Figure(
+    id="GRIS-F17-3D",
+    title="Offline renderers to equal error, in space",
+    world="tracer3d",
+    source="[GRIS Fig. 17; 9.3]",
+    claims=("GRIS-F17",),
+    conditions=(
+        Conditions(
+            ("GRIS-F17",),
+            "Fig. 17; 9.3",
+            Setup("offline", "still", "indirect", "production scenes, equal time"),
+            Setup("offline", "still", "indirect", "five crops of four scenes and an inset of CB3-glossy, equal rays"),
+        ),
+    ),
+    arm="method",
+    presets={
+        "quick": {
+            "views": ["CB3-glossy, box"],
+            "wide": 20,
+            "path tracing": 256,
+            "path reuse": 32,
+            "reconnection": 16,
+            "hybrid": 16,
+        },
+        "paper": {
+            "views": list(VIEWS),
+            "wide": 36,
+            "path tracing": 512,
+            "path reuse": 128,
+            "reconnection": 32,
+            "hybrid": 32,
+        },
+    },
+    chunks=chunks,
+    compute=compute,
+    combine=combine,
+    draw=draw,
+    check=check,
+)
