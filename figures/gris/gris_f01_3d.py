@@ -133,7 +133,7 @@ FIGURE = Figure(
     arm="method",
     presets={
         "quick": {"views": [BOX], "wide": 20, "replicas": 8, PT: 96},
-        "paper": {"views": [BOX, ROOM], "wide": 36, "replicas": 48, PT: 576},
+        "paper": {"views": [BOX, ROOM], "wide": 36, "replicas": 32, PT: 384},
     },
     chunks=chunks,
     compute=compute,

@@ -245,7 +245,7 @@ FIGURE = Figure(
     arm="method",
     presets={
         "quick": {"wide": 24, "trees": 16, "replicas": {BOX: 8}},
-        "paper": {"wide": 36, "trees": 256, "replicas": {BOX: 48, FOOT: 48, ROOM: 96, MATT: 24}},
+        "paper": {"wide": 36, "trees": 256, "replicas": {BOX: 32, FOOT: 32, ROOM: 48, MATT: 16}},
     },
     chunks=chunks,
     compute=compute,
