@@ -188,7 +188,7 @@ FIGURE = Figure(
         },
         "paper": {
             "n": [1, 2, 3, 4, 6, 8, 12, 16],
-            "inputs": {ADJACENT: 2560, FOOT: 8192},
+            "inputs": {ADJACENT: 1536, FOOT: 4096},
             "weights": {ADJACENT: list(WEIGHTS), FOOT: list(COMPARED[FOOT])},
         },
     },
