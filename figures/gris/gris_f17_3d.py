@@ -4,7 +4,7 @@ As in flatland, by the same code: offline frames, indirect light.  Views are fiv
 and an inset of two glossy boxes that mirror each other.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,17 +83,28 @@ def speedups(a: Arrays, method: str) -> dict[str, float]:
 def check(a: Arrays) -> list[Claim]:
     """Best speedups, as in flatland, and beside them those of every view."""
     all_of = {method: speedups(a, method) for method in METHODS[1:]}
-    best = {method: max(each.values()) for method, each in all_of.items()}
-    claims = []
-    for method in SHIFTS:
-        (where,) = (view for view, speedup in all_of[method].items() if speedup == best[method])
-        fast = criteria.above(best[method], 3), criteria.above(best[method] / best["path reuse"], 1)
-        for outcome, what in zip(fast, ("in rays of path tracing", "over that of path reuse"), strict=True):
-            claims.append(Claim("GRIS-F17", outcome, f"{method}: best speedup {what}", reason=f"In {where}."))
-    return claims + [
-        Claim("GRIS-F17", criteria.reported(in_words(each)), f"{method}: speedup view by view")
-        for method, each in all_of.items()
+    return [
+        *(claim for method in SHIFTS for claim in fastest(all_of, method)),
+        *(
+            Claim("GRIS-F17", criteria.reported(in_words(each)), f"{method}: speedup view by view")
+            for method, each in all_of.items()
+        ),
     ]
+
+
+def fastest(all_of: Mapping[str, Mapping[str, float]], method: str) -> Iterator[Claim]:
+    """The best speedup of one shift, by itself and over that of path reuse; of all views only."""
+    best = {name: max(found, key=found.__getitem__) for name, found in all_of.items()}
+    ours, reused = all_of[method][best[method]], all_of[REUSE][best[REUSE]]
+    whole = len(all_of[method]) == len(VIEWS)
+    why = f"In {best[method]}; path reuse: {reused:.3g} in {best[REUSE]}." if whole else LATER
+    for outcome, what in ((criteria.above(ours, 3), TRACED), (criteria.above(ours / reused, 1), OVER_REUSE)):
+        yield Claim("GRIS-F17", outcome if whole else None, f"{method}: best speedup {what}", reason=why)
+
+
+REUSE = METHODS[1]
+TRACED, OVER_REUSE = "in rays of path tracing", "over that of path reuse"
+LATER = "The best of one view says nothing: the paper preset has them all."
 
 
 # ---------------------------------------------------------------- picture
