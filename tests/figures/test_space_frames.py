@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from figures.experiments import arriving, nearby, solid
+from figures.experiments import arriving, nearby, offline, solid
 from figures.experiments.references import INDIRECT, reference
 from figures.experiments.views import HYBRID, setting, standard, view
 from figures.gris import gris_f07_3d as windows
+from figures.gris import gris_f17_3d as shifts
 from figures.gris.gris_f07flat import one_pass
 from flatland2d import SCENES
 from flatland2d.sensors import FILM
@@ -114,6 +115,26 @@ def test_pixels_around_others_stay_within_their_crop_and_the_radius():
     assert not found[[0, 2, 3, 4]].any()
     assert (row**2 + column**2).max() == 9
     assert found[1].sum() == 11  # a quarter of the disk: 4 + 3 + 3 + 1
+
+
+# ---------------------------------------------------------------- both shifts
+
+
+def alike(scene: str) -> bool:
+    """Whether frames of both shifts are the same bytes, in small crops."""
+    crops = standard(scene)
+    small = replace(crops, pinhole=replace(crops.pinhole, width=8, height=8))
+    frames = [offline.render(offline.METHODS[m], scene, 1, np.random.default_rng(3), small) for m in shifts.SHIFTS]
+    return bool(np.array_equal(frames[0]["images"], frames[1]["images"]))
+
+
+@pytest.mark.parametrize("scene", shifts.ONE_MAP)
+def test_one_shift_is_rendered_only_where_both_are_one_map(scene):
+    assert alike(scene)
+
+
+def test_below_glass_the_shifts_are_two_maps():
+    assert not alike("GlassBall3")
 
 
 # ---------------------------------------------------------------- passes over groups
