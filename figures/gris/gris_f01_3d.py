@@ -128,7 +128,7 @@ def prices(a: Arrays) -> str:
 def draw(a: Arrays) -> "Picture":
     """One frame of every renderer, view by view, and MAPE."""
     views = [view for view in VIEWS if f"{view}.reference" in a]
-    picture, axes = style.panels(1, len(views) + 1, width=4.4, height=4.2)
+    picture, axes = style.panels(1, len(views) + 1, width=4.1, height=4.2)
     for axis, view in zip(axes[0], views, strict=False):
         images = {"reference": a[f"{view}.reference"]}
         images |= {NAMES[method].replace(", ", ",\n"): a[f"{view}.{method}.image"] for method in (PT, GI, "hybrid")}

@@ -203,7 +203,7 @@ def beside(a: Arrays, what: str, view: str, mask: str, compared: str) -> Claim:
 def draw(a: Arrays) -> "Picture":
     """Frames of the insets that are there, and the errors of all pixels that are compared."""
     insets = [view for view in solid.INSETS if f"{view}.reference" in a]
-    picture, axes = style.panels(1, len(insets) + 1, width=4.4, height=4.0)
+    picture, axes = style.panels(1, len(insets) + 1, width=4.1, height=4.0)
     for axis, view in zip(axes[0], insets, strict=False):
         images = {"reference": a[f"{view}.reference"]}
         images |= {LINES.get(method, method): a[f"{view}.{method}.image"] for method in RENDERED[view]}

@@ -159,6 +159,8 @@ def draw(a: Arrays) -> "Picture":
     for axis, view in zip(axes[0], views, strict=True):
         for mis in (each for each in COMPARED[view] if there(a, view, each)):
             axis.loglog(a["n"], variances(a, view, mis), **style.look(mis), markevery=1)
+        axis.set_xticks([], minor=True)
+        axis.set_xticks(a["n"], [str(n) for n in a["n"]])
         axis.set(xlabel="samples $n$ per pixel", ylabel="relative variance of $f(Y) W_Y$")
         axis.set_title(f"7 x 7 pixels, {view}")
         style.below(axis, ncols=3)

@@ -144,12 +144,15 @@ def same_time(a: Arrays, view: str) -> float:
     return offline.equal_time(1) * float(a[f"{view}.target"][0]) / TARGET
 
 
+SHORT = {"CB3-glossy, box": "glossy\nbox", "GlassBall3": "Glass-\nBall3"}
+
+
 def _bars(axis: "Axes", a: Arrays, views: Sequence[str]) -> None:
     for k, method in enumerate(METHODS[1:]):
         axis.bar(np.arange(len(views)) + 0.27 * (k - 1), list(speedups(a, method).values()), 0.25, **style.bar(method))
     axis.axhline(1, color=style.INK, lw=1, ls=":", label="as path tracing")
     axis.set_yscale("log")
-    axis.set_xticks(range(len(views)), [view.replace(", ", ",\n").replace("-", "-\n") for view in views])
+    axis.set_xticks(range(len(views)), [SHORT.get(view, view) for view in views])
     axis.set(ylabel="rays of path tracing / rays", title=f"To the MAPE of {TARGET} trees")
     axis.grid(visible=False, axis="x")
     style.below(axis, ncols=2)
