@@ -14,7 +14,8 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import arriving, indirect, realtime, solid
-from figures.gris.gris_f01 import DIRECT, GI, NAMES, PT, TRUTH, bias, judged, pair, part_of
+from figures.gris import gris_f01
+from figures.gris.gris_f01 import DIRECT, GI, NAMES, PT, TRUTH, judged, part_of
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.metrics import SMALL, mape
@@ -106,8 +107,8 @@ def thrown(a: Arrays) -> Claim:
         return Claim("GRIS-F01", None, part, reason=LATER)
     ours, its = (a[f"{ROOM}.{method}.crops"].mean(axis=0) for method in ("hybrid", GI))
     each = ", ".join(f"{ratio:.2f}" for ratio in ours / its)
-    text = f"{criteria.ratio_interval(*pair(a, ROOM, GI))[2]}; crop by crop {each}"
-    return Claim("GRIS-F01", criteria.reported(text), part, reason=THROWN + bias(a, ROOM))
+    text = f"{criteria.ratio_interval(*gris_f01.pair(a, ROOM, GI))[2]}; crop by crop {each}"
+    return Claim("GRIS-F01", criteria.reported(text), part, reason=THROWN + gris_f01.bias(a, ROOM))
 
 
 EXCEPT = "Not where glossy boxes only throw light onto rough walls: there ReSTIR GI has the lower error (below)."

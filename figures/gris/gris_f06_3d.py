@@ -160,10 +160,7 @@ FACE = (
 )
 ONE_MAP = "With rough boxes both shifts are one map away from edges, bit for bit, and nothing is compared there."
 
-NARROW = (
-    "The test does lower the noise of the nearest of them (below), and hardly that of the others; few bright pixels "
-    "decide."
-)
+NARROW = "Few bright pixels decide, and most of what the test saves is saved where surfaces are nearest (below)."
 
 BOTH, TESTED = "hybrid / reconnection", "with / without distance test"
 REPORTED: Mapping[str, tuple[str, str, str]] = {

@@ -186,7 +186,7 @@ FIGURE = Figure(
             "views": list(VIEWS),
             "wide": 36,
             "path tracing": 256,
-            "path reuse": 128,
+            "path reuse": 48,
             "reconnection": 16,
             "hybrid": 16,
         },
