@@ -75,9 +75,10 @@ ORACLE = {
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }
 OF_THEORY = {
-    "metrics.neighbour_correlation: ...correlation(errors[..., {:-r], errors[..., r: => r:], errors[..., :-r}])...": (
-        "a correlation is symmetric"
-    ),
+    "metrics.neighbour_correlation: ...[(e[..., {:-r], e[..., r: => r:], e[..., :-r}]) for...": "a correlation is symmetric",
+    "decorrelation.bounded: ...all(axis=0), 1.0 => 1.0, inside...": TRUTH,
+    "decorrelation.attempt: apart(move.{p_hat, move.p_hat_new => p_hat_new, move.p_hat}...": "apart is symmetric",
+    "batch.pick.refer: if {any(... => True}:": "the same columns, each input gathered before one is picked",
     "metrics._frequencies: ...{, sparse=True => }...": "the same numbers, in more memory",
     "images.spread_in_disk.around: ...k {* => /} GOLDEN...": "1 / GOLDEN is 1 + GOLDEN, the same modulo 1",
     "images.tiles: ...swapaxes({1, 2 => 2, 1})...": "swapping is symmetric",
