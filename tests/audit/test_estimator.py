@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from restir_ref.audit import CannotAudit, audit_estimator, estimator
+from restir_ref.audit import CannotAudit, audit_estimator, estimator, rehearsal
 from restir_ref.audit.engines import ENGINES
 from restir_ref.audit.estimator import TOLERANCE
 from restir_ref.audit.likeness import Signature, lookalikes, signatures
@@ -177,3 +178,17 @@ def test_too_many_leaves_are_refused_with_an_estimate() -> None:
 def test_a_report_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         audit_estimator(right, SCENE).leaves = 0  # type: ignore[misc]
+
+
+def test_a_result_without_weights_is_refused_before_its_samples_are_looked_at() -> None:
+    with pytest.raises(CannotAudit, match="without samples x and weights W"):
+        rehearsal.checked(SimpleNamespace(x=np.zeros(2, dtype=int)), 2, 3)
+
+
+def test_two_runs_have_the_same_weights_only_if_all_calls_have() -> None:
+    def take(*asked):
+        return rehearsal.Take([np.array(each) for each in asked], np.zeros(1), np.zeros(1))
+
+    assert rehearsal._same_weights(take([1, 2], [3]), take([1, 2], [3]))
+    assert not rehearsal._same_weights(take([1, 2], [3]), take([1, 2], [4]))
+    assert not rehearsal._same_weights(take([1, 2]), take([1, 2], [3]))
