@@ -120,6 +120,7 @@ TRACER3D = {
     "sensors.Pinhole.project: ...dot({right, to => to, right})...": SYMMETRIC,
     "meshes.with_area: n = np.cross(sides[:, {1], sides[:, 2 => 2], sides[:, 1}])": "an area has no sign",
     "witness: Description = ...": "a type",
+    "shapes.turned: x = ...{, dtype=float => }...": "less their mean, they are of that type",
     "witness._rgb: ...{float(c) => c}...": PRINTS,
     "cli._thumbnails: ...{unit='scene',  => }...": "words of a bar",
     "cli._path_traced: ...{total=trees,  => }...": "words of a bar",
