@@ -128,6 +128,7 @@ TRACER3D = {
 AUDIT = {
     "cases.drawn: pick = {np.floor => }(...": "what is not negative is cut down to the same integer",
     "compare.Check.worst: ...{float(expected) => expected}...": PRINTS,
+    "mistakes.against_old_sum: s, before = (np.zeros(len(terms.s){, dtype=int => }), ...": PRINTS,
     "compare.Check.worst: columns = int(self.wrong.reshape(-{1 => 2}...": "any negative number will do",
     "load._check_values: for name in ('{u', 'u_stream => u_stream', 'u}'):": "which of two mistakes is named first",
     "mistakes.at_s: ...[{0 => -1}])": "the first of one row is the last",
