@@ -13,7 +13,7 @@ from restir_ref.audit.engines import ENGINES
 from restir_ref.audit.estimator import TOLERANCE
 from restir_ref.audit.likeness import Signature, lookalikes, signatures
 from restir_ref.integrals import Pixels, Reservoirs
-from restir_ref.mis import ALL_CANONICAL, WEIGHTS
+from restir_ref.mis import ALL_CANONICAL, WEIGHTS, Confidences
 from restir_ref.oracle.cells import Frame, cells
 from restir_ref.oracle.scenes import (
     Scene,
@@ -192,3 +192,9 @@ def test_two_runs_have_the_same_weights_only_if_all_calls_have() -> None:
     assert rehearsal._same_weights(take([1, 2], [3]), take([1, 2], [3]))
     assert not rehearsal._same_weights(take([1, 2], [3]), take([1, 2], [4]))
     assert not rehearsal._same_weights(take([1, 2]), take([1, 2], [3]))
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_where_nobody_has_confidence_an_engine_s_weights_are_zero_without_a_warning(name) -> None:
+    q, c = np.array([[1.0, 2.0], [3.0, 0.5]]), Confidences([np.zeros(2)] * 2, [0])
+    assert all((np.asarray(ENGINES[name].m(i, q.__getitem__, c)) == 0).all() for i in range(2))
