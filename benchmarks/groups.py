@@ -78,6 +78,7 @@ ORACLE = {
     "scenes.random_scene: ...for j in range({ => 1, }count)...": "nothing is below 0",
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }
+ELIMINATED = "elimination in another order"
 OF_THEORY = {
     "metrics.neighbour_correlation: ...[..., {:-r], e[..., r: => r:], e[..., :-r}])...": "a correlation is symmetric",
     "decorrelation.bounded: ...all(axis=0), 1.0 => 1.0, inside...": TRUTH,
@@ -91,6 +92,21 @@ OF_THEORY = {
     "images.disk: ...int(radius) + {1 => 2})": "what is beyond the radius is left out",
     "images.disk: ...{, kind='stable' => })": "steps of one length in another order",
     "images._rings: ...{, kind='stable' => })...": "steps of one angle in another order",
+    "poisson.ends: ...swapaxes(-1{, -1 - k =>  - k, -1})...": "swapping is symmetric",
+    "poisson.by_transform.solve: ...{, overwrite_x=True => }))": "the same numbers, in more memory",
+    "poisson.by_transform.solve: ...overwrite_x={True => False}))": "the same numbers, in more memory",
+    "poisson.by_elimination: ...{permc_spec='MMD_AT_PLUS_A',  => }...": ELIMINATED,
+    "poisson.by_elimination: ...{diag_pivot_thresh=0.0,  => }...": ELIMINATED,
+    "poisson.by_elimination: ...{, options={'SymmetricMode': True} => })": ELIMINATED,
+    "poisson.by_elimination: ...diag_pivot_thresh={0 => ...": ELIMINATED,
+    "poisson.by_elimination: ...options={{'SymmetricMode': True => }})": ELIMINATED,
+    "poisson.by_elimination: ...options={'SymmetricMode': {True => False}})": ELIMINATED,
+    "poisson.symbol: ...sparse=True => }...": "the same numbers, in more memory",
+    "poisson.symbol: ...sparse={True => False}...": "the same numbers, in more memory",
+    "poisson.checked: _forward({g, own => own, g}, name)": "a product is symmetric",
+    "poisson_l1.normal_equations...{w_g, steps => steps, w_g}...": "a product is symmetric",
+    "poisson_l1.normal_equations: ...{w_g, gradients => gradients, w_g}...": "a product is symmetric",
+    "poisson_l1.conjugate_gradients: ...dot({r, z => z, r})...": "a product is symmetric",
 }
 SYMMETRIC = "one and the other are treated alike"
 PRINTS = "a number prints alike, whatever its type"
@@ -165,6 +181,8 @@ THEORY = (
     "windows",
     "images",
     "gradient",
+    "poisson",
+    "poisson_l1",
     "decorrelation",
     "metrics",
     "counting",

@@ -52,6 +52,11 @@ class Pinhole:
         """One number: the place on the film."""
         return 1
 
+    @property
+    def film_numbers(self) -> int:
+        """That number."""
+        return 1
+
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A ray through the pixel; box filter, weight 1."""
         forward, right = self._axes()
@@ -109,6 +114,11 @@ class FluenceMap:
     def numbers(self) -> int:
         """Three numbers: the place in the pixel, and the direction."""
         return 3
+
+    @property
+    def film_numbers(self) -> int:
+        """The place, to the right and up; the direction is not."""
+        return 2
 
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A uniform place of the pixel and a uniform direction; weight 2 pi."""

@@ -2,8 +2,8 @@
 
 One idea: *an image is many integrals that can share samples*.  Read the modules in this order:
 `batch`, `chance`, `integrals`, `mis`, `resampling`, `streaming`, `restir`, `loop`, `images`, then `gradient`,
-`decorrelation`, `oracle` and `transport`.  The keys in square brackets, such as [GRIS Eq. 36], are explained in
-`docs/references.md`, the symbols in `docs/notation.md`.
+`poisson`, `decorrelation`, `oracle` and `transport`.  The keys in square brackets, such as [GRIS Eq. 36], are
+explained in `docs/references.md`, the symbols in `docs/notation.md`.
 """
 
 from restir_ref.chance import Chance, Live

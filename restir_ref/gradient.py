@@ -2,16 +2,17 @@
 
 The paired domain of pixels (i, j) is (Omega_i x {0}) + (Omega_j x {1}): a base path in one pixel
 beside its offset path in the other, which the inner shift makes.  `Pairs` wraps any integrals; the
-passes of `restir` do the rest.  Scalar integrands only: the sign of a coloured difference is ambiguous.
+passes of `restir` do the rest.  A coloured difference has no sign: its parts are told apart by the sign of its mean.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio
+from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Chance
 from restir_ref.guards import apart, read_only
 from restir_ref.integrals import (
@@ -22,6 +23,7 @@ from restir_ref.integrals import (
     Sample,
     Shifted,
     held,
+    pixels,
     shifted,
     target,
     times,
@@ -41,56 +43,69 @@ def omega(x: Sample, base: Pixels, y: Shifted, offset: Pixels, proxy: Proxy = ta
 
 
 def gap(x: Sample, base: Pixels, y: Shifted, offset: Pixels) -> Array:
-    """f_i(x) - f_j(T_ij x) J, y = T_ij x; (N,).  [GPT Eq. 2, 15]"""
-    f_base = scalar(base.of.contribution(base.index, read_only(x)))
-    return np.asarray(f_base - scalar(weighted(offset, y.x, y.J)))
-
-
-def scalar(f: Array) -> Array:
-    """The one channel of a contribution (1, N).
-
-    Raises ValueError for more.
-    """
-    if len(f) != 1:
-        raise ValueError(
-            f"gradients are of scalar integrands, but this contribution has {len(f)} channels, of shape {f.shape}: "
-            f"take one channel, or their mean, at a time."
-        )
-    return np.asarray(f[0])
+    """f_i(x) - f_j(T_ij x) J, y = T_ij x; (C, N).  [GPT Eq. 2, 15]"""
+    return np.asarray(base.of.contribution(base.index, read_only(x)) - weighted(offset, y.x, y.J))
 
 
 def one_sided(X: Reservoirs, base: Pixels, offset: Pixels, proxy: Proxy = target) -> Array:
-    """<Delta'_ij> = w_ij(y) (f_i(y) - f_j(T_ij y) J) W_y; (N,).  [GPT Eq. 11]"""
+    """<Delta'_ij> = w_ij(y) (f_i(y) - f_j(T_ij y) J) W_y; (C, N).  [GPT Eq. 11]"""
     y = shifted(X.x, base, offset)
     return times(omega(X.x, base, y, offset, proxy) * gap(X.x, base, y, offset), X.W)
 
 
 def gradient_after(X: Reservoirs, i: Pixels, j: Pixels, proxy: Proxy = target) -> Array:
-    """<Delta_ij> = <Delta'_ij> - <Delta'_ji> from the pixels' own samples, all in X; (N,).  [GPT Eq. 12]"""
+    """<Delta_ij> = <Delta'_ij> - <Delta'_ji> from the pixels' own samples, all in X; (C, N).  [GPT Eq. 12]"""
     return one_sided(held(X, i), i, j, proxy) - one_sided(held(X, j), j, i, proxy)
 
 
-Part = Callable[[Array], Array]
-"""The part >= 0 of a signed integrand that one reservoir samples."""
+COLOURED = 0.1
+"""By this share of the mean of |d| a coloured d belongs to both signs: where its mean is 0, it need not be."""
 
 
-def positive(d: Array) -> Array:
-    """max(d, 0).  [GPT Eq. 25]"""
-    return np.asarray(np.maximum(d, 0))
+@dataclass(frozen=True)
+class Part:
+    """What one reservoir samples of a signed integrand d (C, N).
+
+    target  p_hat(d) >= 0, (N,);  share  how much of d belongs to it, (N,): 1 in all, over the parts of d
+    """
+
+    target: Callable[[Array], Array]
+    share: Callable[[Array], Array]
 
 
-def negative(d: Array) -> Array:
-    """max(-d, 0).  [GPT Eq. 26]"""
-    return np.asarray(np.maximum(-d, 0))
+def upward(d: Array) -> Array:
+    """max(d, 0); of several channels max(mean d, 0) + COLOURED mean |d|, so that all of d is sampled; (N,).  [ours]"""
+    slack = COLOURED * abs(d).mean(axis=0) if len(d) > 1 else 0
+    return np.asarray(np.maximum(d.mean(axis=0), 0) + slack)
 
 
-def magnitude(d: Array) -> Array:
-    """|d|: one reservoir for both signs, whose estimate +-sum w jumps between them.  [GPT Eq. 19]"""
-    return np.asarray(abs(d))
+def share_upward(d: Array) -> Array:
+    """p_hat_+ / (p_hat_+ + p_hat_-); of one channel 1 where d > 0, else 0; (N,)."""
+    up = upward(d)
+    return ratio(up, up + upward(-d))
 
 
-SIGNS: Mapping[str, Part] = MappingProxyType({"positive": positive, "negative": negative})
-"""Positivization: d = positive(d) - negative(d).  [GPT Eq. 23]"""
+def size(d: Array) -> Array:
+    """|d|, the mean over channels; (N,)."""
+    return np.asarray(abs(d).mean(axis=0))
+
+
+POSITIVE = Part(upward, share_upward)
+"""max(d, 0).  [GPT Eq. 25]"""
+
+NEGATIVE = Part(lambda d: upward(-d), lambda d: share_upward(-d))
+"""max(-d, 0).  [GPT Eq. 26]"""
+
+MAGNITUDE = Part(size, lambda d: (size(d) > 0).astype(float))
+"""|d|: one reservoir for both signs, whose estimate +-sum w jumps between them.  [GPT Eq. 19]"""
+
+
+SIGNS: Mapping[str, Part] = MappingProxyType({"positive": POSITIVE, "negative": NEGATIVE})
+"""Positivization: d = max(d, 0) - max(-d, 0).  [GPT Eq. 23]"""
+
+
+Drawn = tuple[Sample, Array]
+"""A candidate x with its m W (N,)."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +122,7 @@ class Pairs:
     """One part of the differences int f_i - int f_j of pairs (i, j).
 
     ends (2, E) holds the pixels i and j of every pair; column = replica * E + pair.  Contributions
-    are signed: an estimate adds up the shading of both signs, or is that of `magnitude` alone.
+    are signed: an estimate adds up the shading of both signs, or is that of `MAGNITUDE` alone.
     The weight w* compares targets [GPT Eq. 13]; proxy=pdf compares sampling densities instead
     [GPT Eq. 4, as Eq. 16 has it], for candidates fresh from the samplers.
     """
@@ -132,6 +147,18 @@ class Pairs:
         for x, mW in self.of.candidates(self.end(index, k).index, chance):
             yield self.paired(index, x, k), mW
 
+    def offered(self, index: Array, drawn: Iterable[Drawn]) -> Iterator[tuple[Paired, Array]]:
+        """Candidates from what has been drawn for all pixels of whole images, once for every reservoir that reads it.
+
+        Both signs of a pair, all pairs of a pixel, and the pixel itself may share one draw: each is unbiased by itself.
+        """
+        drawn = list(drawn)
+        for side in (0, 1):
+            k = np.full(len(index), side)
+            columns = self.end(index, k).index
+            for x, mW in drawn:
+                yield self.paired(index, take(x, columns), k), mW.take(columns)
+
     def paired(self, index: Array, x: Sample, k: Array) -> Paired:
         """The base path x on side k with its offset path T_ij(x) on the other: the inner shift.  [GPT 4.2.1]"""
         return Paired(x, k, shifted(x, self.end(index, k), self.end(index, 1 - k)))
@@ -139,12 +166,15 @@ class Pairs:
     def target(self, index: Array, x: Paired) -> Array:
         """p_hat = max(+-w* G, 0), or w* |G|; (N,).  [GPT Eq. 19, 25-26]"""
         # hazard: Eq. 19 is printed with T* inside p_hat; x has been shifted already, and once more is biased.
-        return self.part(self.difference(index, x))
+        return self.part.target(self.difference(index, x))
 
     def contribution(self, index: Array, x: Paired) -> Array:
-        """w* G where p_hat > 0, shape (1, N).  [GPT Eq. 17, 24]"""
+        """The part's share of w* G, which is all of it where p_hat > 0 if there is one channel; (C, N).
+
+        [GPT Eq. 17, 24]
+        """
         d = self.difference(index, x)
-        return np.where(self.part(d) > 0, d, 0)[None]
+        return d * self.part.share(d)
 
     def shift(self, x: Paired, index: Array, to: Pixels) -> Shifted:
         """T*: the base path moves from i to i' or j to j', its offset path is rebuilt; J* = J_tau.  [GPT Eq. 21-22]"""
@@ -152,12 +182,17 @@ class Pairs:
         tau = shifted(x.x, self.end(index, x.k), there.end(to.index, x.k))
         return Shifted(there.paired(to.index, tau.x, x.k), tau.J)
 
+    def displaced(self, x: Paired, by: Array) -> Paired:
+        """The base path at another place of the film, for integrals that have one; its offset path is rebuilt later."""
+        of: Any = self.of
+        return Paired(of.displaced(x.x, by), x.k, x.offset)
+
     def end(self, index: Array, k: Array) -> Pixels:
         """The pixels on side k (N,) of each column's pair."""
-        return Pixels(self.of, self.ends[k, index % self.n])
+        return Pixels(self.of, index // self.n * pixels(self.of) + self.ends[k, index % self.n])
 
     def difference(self, index: Array, x: Paired) -> Array:
-        """w* G = w (f_base(x) - f_offset(T x) J), negated for bases in pixel j; (N,).  [GPT Eq. 15-16]"""
+        """w* G = w (f_base(x) - f_offset(T x) J), negated for bases in pixel j; (C, N).  [GPT Eq. 15-16]"""
         base, offset = self.end(index, x.k), self.end(index, 1 - x.k)
         d = omega(x.x, base, x.offset, offset, self.proxy) * gap(x.x, base, x.offset, offset)
         return np.where(x.k == 0, d, -d)

@@ -73,6 +73,11 @@ class Pinhole:
         """Two numbers: the place in the pixel, to the right and down."""
         return 2
 
+    @property
+    def film_numbers(self) -> int:
+        """Both numbers."""
+        return 2
+
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A ray through the pixel; box filter, weight 1."""
         return self.through(self.left + pixel % self.width + u[0], self.top + pixel // self.width + u[1])
@@ -137,6 +142,11 @@ class Mosaic:
     def numbers(self) -> int:
         """Two numbers: the place in the pixel, to the right and down."""
         return self.pinhole.numbers
+
+    @property
+    def film_numbers(self) -> int:
+        """Both numbers."""
+        return 2
 
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """A ray through the pixel; box filter, weight 1."""

@@ -17,7 +17,7 @@ from figures.claims.figure import Arrays, Claim, Figure
 from figures.report import style
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Live
-from restir_ref.gradient import TossedPairs, gradient_after, magnitude, negative, positive
+from restir_ref.gradient import MAGNITUDE, NEGATIVE, POSITIVE, TossedPairs, gradient_after
 from restir_ref.integrals import Pixels
 from restir_ref.oracle.cells import Frame
 from restir_ref.restir import initial, resample, shade
@@ -66,9 +66,9 @@ class Exact:
     @classmethod
     def of(cls, frame: Frame) -> "Exact":
         """From the cells of two pixels, sampled by one technique."""
-        K, pairs = frame.cells.v.shape[-1], TossedPairs(frame, ONE_PAIR, magnitude)
+        K, pairs = frame.cells.v.shape[-1], TossedPairs(frame, ONE_PAIR, MAGNITUDE)
         index, x = np.zeros(K, dtype=int), np.arange(K)
-        d = [pairs.difference(index, pairs.paired(index, x, np.full(K, k))) for k in (0, 1)]
+        d = [pairs.difference(index, pairs.paired(index, x, np.full(K, k)))[0] for k in (0, 1)]
         return cls(frame.cells.v, frame.cells.pdf[0], frame.cells.f, np.stack(d))
 
     @property
@@ -84,7 +84,8 @@ class Exact:
     @property
     def floor_single(self) -> float:
         """4 P N: the estimate is sign(G) (P + N), positive with probability P / (P + N)."""
-        return float(4 * self._integral(positive(self.d)).sum() * self._integral(negative(self.d)).sum())
+        P, N = (self._integral(part.target(self.d[None])).sum() for part in (POSITIVE, NEGATIVE))
+        return float(4 * P * N)
 
     def after(self, M: Array) -> Array:
         """E[(sum w) (sum w g^2 / f^2)] - E[...]^2 per pixel, g = w G, from pairs of equal and of other candidates."""
@@ -115,12 +116,12 @@ def real_passes(line: Line, M: int, n: int, chance: Live) -> Arrays:
     X = initial(Pixels(line, np.arange(2 * n)), chance, M)
     left, right = (Pixels(line, np.arange(k, 2 * n, 2)) for k in (0, 1))
     index = np.arange(n)
-    parts = [TossedPairs(line, ONE_PAIR, part) for part in (magnitude, positive, negative)]
+    parts = [TossedPairs(line, ONE_PAIR, part) for part in (MAGNITUDE, POSITIVE, NEGATIVE)]
     drawn = [(x, mW / M) for _ in range(M) for x, mW in parts[0].candidates(index, chance)]
     Y = [resample(drawn, Pixels(part, index), chance) for part in parts]
     whole, plus, minus = (shade(each, Pixels(part, index))[0] for each, part in zip(Y, parts, strict=True))
     return {
-        "estimates": np.stack([gradient_after(X, left, right), whole, plus + minus]),
+        "estimates": np.stack([gradient_after(X, left, right)[0], whole, plus + minus]),
         "chosen": np.stack([X.x[0::2], X.x[1::2], *(each.x.x for each in Y)]),
     }
 

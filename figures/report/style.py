@@ -143,9 +143,13 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
         # pixels of a pair, and their difference
         "$f_1$": Look(GREEN, "v", "-", ""),
         "$f_2$": Look(PURPLE, "P", "--", ""),
-        "after": Look(ORANGE, "s", "--", "//"),
+        "after": Look(VERMILLION, "D", "--", "xx"),
         "with": Look(BLUE, "o", "-", ""),
         "positivized": Look(INK, "^", "-.", ".."),
+        # reconstructions
+        "primal": Look(ORANGE, "s", "--", "//"),
+        "L2": Look(BLUE, "o", "-", ""),
+        "L1": Look(INK, "^", "-.", ".."),
         # mutations
         "right": Look(BLUE, "o", "-", ""),
         "W inverted": Look(ORANGE, "s", "--", ""),

@@ -101,6 +101,7 @@ class Peephole:
     x: Array
     w: Array
     numbers: int = 0
+    film_numbers: int = 0
 
     @property
     def n(self) -> int:

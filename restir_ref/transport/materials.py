@@ -193,6 +193,11 @@ def choose_number(P_x: Array, P_y: Array, lobe: Array, u: Array) -> Array:
     return np.asarray(start_y + ratio((u - start_x) * pick([*P_y], lobe), pick([*P_x], lobe)))
 
 
+def albedo(t: Table) -> Array:
+    """The colours of each material's lobes together, (C, M): how much of the light it scatters at most."""
+    return np.asarray(t.colour.reshape(len(t.colour), -1, t.L).sum(axis=-1))
+
+
 def lobe_roughness(t: Table, v: Vertex, lobe: Array) -> Array:
     """Perceptual roughness of a lobe (N,); 0 for delta lobes."""
     return t.roughness.take(v.material * t.L + lobe)

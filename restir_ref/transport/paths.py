@@ -34,6 +34,10 @@ class Sensor(Protocol):
     def numbers(self) -> int:
         """Primary numbers per ray."""
 
+    @property
+    def film_numbers(self) -> int:
+        """How many of them, the first ones, are the place in the pixel, along the last axis of the image first."""
+
     def ray(self, pixel: Array, u: Array) -> tuple[Array, Array, Array]:
         """Start (d, N), direction (d, N), weight (N,)."""
 

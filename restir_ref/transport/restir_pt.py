@@ -2,16 +2,17 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
-from restir_ref.batch import Array
+from restir_ref.batch import Array, changed
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted
-from restir_ref.transport.paths import Path, Tracer, leaves, trace
+from restir_ref.transport.paths import Path, Tracer, Tree, leaves, trace
 from restir_ref.transport.record import record
 from restir_ref.transport.shifts import shift_path
-from restir_ref.transport.subtrees import of_leaf, one_leaf
+from restir_ref.transport.subtrees import of_leaf, one_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +26,22 @@ class PathIntegrals:
         """Number of pixels."""
         return self.tracer.sensor.n
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Rows and columns of the image, or of each of its crops; (n,) for pixels in a row."""
+        shape: tuple[int, ...] = getattr(self.tracer.sensor, "shape", (self.n,))
+        return shape
+
     def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Path, Array]]:
         """One path tree, resampled to one of its leaves, which cover disjoint parts of the sample space."""
         tree = trace(self.tracer, chance.uniform((self.tracer.D, len(index))), index % self.n)
-        leaf, W = one_leaf(tree, chance)
-        k, nee, F = zip(*leaves(tree), strict=True)
+        k, nee, F = zip(*self.leaves(tree), strict=True)
+        leaf, W = one_of(F, chance)
         yield record(self.tracer, tree, np.array(k)[leaf], np.array(nee)[leaf], of_leaf(F, leaf)), W
+
+    def leaves(self, tree: Tree) -> Iterator[tuple[int, bool, Array]]:
+        """(k, nee, F) of the leaves that count: all of them."""
+        return leaves(tree)
 
     def target(self, index: Array, x: Path) -> Array:
         """p_hat = mean of F over channels, visibility and MIS weight included."""
@@ -45,6 +56,21 @@ class PathIntegrals:
         there: PathIntegrals = to.of  # type: ignore[assignment]
         y, J = shift_path(there.tracer, x, to.index % there.n)
         return Shifted(y, J)
+
+    def displaced(self, x: Path, by: Array) -> Path:
+        """The same numbers at another place of the film; not traced yet."""
+        film = self.tracer.sensor.film_numbers
+        place = (x.u[:film] + by) % 1
+        return changed(x, u=np.concatenate([np.where(place < 1, place, 0), x.u[film:]]))
+
+
+@dataclass(frozen=True, eq=False)
+class ScatteredIntegrals(PathIntegrals):
+    """The path integrals without k = 0, a light that the sensor's own ray meets: on fluence maps it hides the rest."""
+
+    def leaves(self, tree: Tree) -> Iterator[tuple[int, bool, Array]]:
+        """All but the first; no shift changes k."""
+        return islice(leaves(tree), 1, None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,13 @@ def behind(tree: Tree) -> Tree:
 
 def one_leaf(tree: Tree, chance: Chance) -> tuple[Array, Array]:
     """RIS over the leaves of each tree by the mean of F over channels: their number in `leaves`, and W; (N,) each."""
-    values = [F.mean(axis=0) for _, _, F in leaves(tree)]
-    one = np.ones(tree.u.shape[-1])
+    return one_of([F for _, _, F in leaves(tree)], chance)
+
+
+def one_of(F: Sequence[Array], chance: Chance) -> tuple[Array, Array]:
+    """The same over any of the leaves, F (C, N) each: the number of the chosen one among them, and W."""
+    values = [each.mean(axis=0) for each in F]
+    one = np.ones(len(values[0]))
     chosen = select([Candidate(np.full(len(one), i), p_hat, one) for i, p_hat in enumerate(values)], chance, one)
     return chosen.x, chosen.W
 

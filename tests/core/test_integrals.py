@@ -11,7 +11,7 @@ from restir_ref import integrals as doors
 from restir_ref import resampling
 from restir_ref.batch import Array
 from restir_ref.decorrelation import Blue, Move, mutate
-from restir_ref.gradient import Pairs, gap, gradient_after, magnitude, omega, one_sided
+from restir_ref.gradient import MAGNITUDE, Pairs, gap, gradient_after, omega, one_sided
 from restir_ref.integrals import (
     NOWHERE,
     Pixels,
@@ -97,7 +97,7 @@ def from_near(integrals):
 def line_pair(**changes) -> tuple[Pairs, Pixels, Pixels]:
     """A pair of pixels of the partial shift, with an inner shift that answers otherwise."""
     line = Returning(partial_shift(), **changes)
-    return Pairs(line, np.array([[0], [1]]), magnitude), *(Pixels(line, np.full(8, k)) for k in (0, 1))
+    return Pairs(line, np.array([[0], [1]]), MAGNITUDE), *(Pixels(line, np.full(8, k)) for k in (0, 1))
 
 
 def paths_of_a_pair(pairs: Pairs):
@@ -428,7 +428,7 @@ def test_the_energy_of_a_proposal_without_a_target_is_that_of_darkness():
 def test_a_gap_to_an_offset_that_is_undefined_is_the_base_alone():
     here, (near, _) = of(Undefined(TOY))
     y = Shifted(np.full(N, 2.0), np.zeros(N))
-    assert np.array_equal(gap(X.x, here, y, near), TOY.contribution(here.index, X.x)[0])
+    assert np.array_equal(gap(X.x, here, y, near), TOY.contribution(here.index, X.x))
     assert np.array_equal(omega(X.x, here, y, near), np.where(target(here, X.x) > 0, 1, 0))
 
 

@@ -8,10 +8,10 @@ from hypothesis import given
 
 from restir_ref.batch import Array, ratio
 from restir_ref.gradient import (
+    MAGNITUDE,
     Pairs,
     gap,
     gradient_after,
-    magnitude,
     omega,
     one_sided,
 )
@@ -74,7 +74,7 @@ def test_pair_weights_add_up_to_one_on_the_line_before_and_after_an_outer_shift(
     for line, i, j in ((partial_shift(), 0, 1), (two_pairs(), 0, 1)):
         X, here = nodes(line, i)
         assert partition_error(X.x, here, nodes(line, j)[1], lambda *at: omega(*at, proxy)) < 1e-12
-    pairs, column = Pairs(line, np.array([[0, 2], [1, 3]]), magnitude), np.zeros(60, dtype=int)
+    pairs, column = Pairs(line, np.array([[0, 2], [1, 3]]), MAGNITUDE), np.zeros(60, dtype=int)
     moved = pairs.shift(pairs.paired(column, X.x, column), column, Pixels(pairs, column + 1)).x
     at = pairs.end(column + 1, moved.k), pairs.end(column + 1, 1 - moved.k)
     assert np.array_equal(line.shift(moved.x, at[0].index, at[1]).x, moved.offset.x)
@@ -208,8 +208,8 @@ def test_gradients_of_final_samples_are_unbiased_after_ten_frames() -> None:
     frame = quotient(shared_peak(), 63)
     x, i, j = one_by_one(frame)
     unit = Reservoirs(x, np.ones(len(x)), np.ones(len(x)))
-    G = np.concatenate([one_sided(unit, i, j), -one_sided(unit, j, i)])
-    estimate = mapped(chained(frame, 10), G[None])
+    G = np.concatenate([one_sided(unit, i, j), -one_sided(unit, j, i)], axis=-1)
+    estimate = mapped(chained(frame, 10), G)
     means = (frame.cells.f * frame.cells.v).sum(axis=-1)
     assert estimate.mean[0] == pytest.approx(means[0] - means[1], rel=1e-10)
     assert estimate.second[0, 0] > estimate.mean[0] ** 2

@@ -6,15 +6,10 @@ import numpy as np
 import pytest
 
 from flatland2d import Pinhole
-from restir_ref.chance import Live
-from restir_ref.gradient import gap
 from restir_ref.guards import whole
-from restir_ref.integrals import Pixels, Shifted
-from restir_ref.restir import initial
 from restir_ref.transport.materials import Layer, Material, table
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Connectability, Tracer, radiance, trace
 from restir_ref.transport.proofs.inversion import traced
-from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.scene import Ball, Facet, Scene, scene
 from restir_ref.transport.shifts import shift_path
 from tests.core.test_bad_input import Mistake, faults
@@ -174,18 +169,7 @@ SCENES = {
 }
 
 
-def coloured_gap() -> None:
-    """A difference of pixels in three channels."""
-    s = scene(PLANE, [Material([Layer("lambert", (0.5, 0.4, 0.3))])], [replace(LIGHT, emission=(1.0, 2.0, 3.0))])
-    here = Pixels(PathIntegrals(replace(TRACER, scene=s)), np.arange(8))
-    X = initial(here, Live(np.random.default_rng(1)))
-    gap(X.x, here, Shifted(X.x, np.ones(8)), here)
-
-
 COLOURS_AND_PLACES = {
-    "a coloured gradient": Mistake(
-        coloured_gap, ValueError, "this contribution has 3 channels, of shape (3, 8)", "take one channel, or their mean"
-    ),
     "a far scene": Mistake(
         lambda: bare(Facet(((2e4, 0), (2e4, 1))), light=Facet(((2e4 + 1, 1), (2e4 + 1, 0)), 0, (1.0,))),
         ValueError,

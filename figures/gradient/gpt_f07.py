@@ -1,0 +1,162 @@
+"""GPT Fig. 7 and 8: gradient images at equal rays, and what reconstruction makes of them.
+
+Three maps of flatland's fluence, each a crop with an edge that was fixed before anything was measured, without the
+light that the map's own rays meet.  The last of ten frames of a still map is judged by its variance over replicas: all
+three estimates of differences are unbiased, so that this is their squared error.  A frame with pair reuse is compared
+with as many averaged ones of the others as cost its rays.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from figures.claims import criteria
+from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
+from figures.experiments.gradients import METHODS, SIDE, averaged, rendered, spread, temporal_only
+from figures.report import style
+from restir_ref.batch import Array
+from restir_ref.metrics import MAP, band_powers
+from restir_ref.poisson import ALPHA, l2
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
+
+SCENES = ("occluders", "ajar", "checker")
+ARMS = {**METHODS, "temporal": temporal_only}
+SHARES = {"with": 1, "after": 2, "path tracing": 4, "temporal": 3}
+"""Images of each method that are averaged: about as many as cost one frame's rays."""
+
+
+def chunks(preset: Any) -> Sequence[dict[str, str]]:
+    """One per scene and method."""
+    return [{"scene": scene, "method": method} for scene in SCENES for method in ARMS]
+
+
+def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
+    """The image and its differences, (replicas, n) each, and rays per pixel; as many more as are averaged."""
+    replicas = preset["replicas"] * SHARES[chunk["method"]]
+    return rendered(f"{chunk['scene']} map", ARMS[chunk["method"]], replicas, rng)
+
+
+def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
+    """Everything by "scene.method.name"."""
+    named = zip(chunks(preset), results, strict=True)
+    return {f"{at['scene']}.{at['method']}.{key}": each for at, part in named for key, each in part.items()}
+
+
+def at_equal_rays(a: Arrays, scene: str, method: str) -> dict[str, Array]:
+    """Means over images that cost about one frame with pair reuse: image, dx and dy, (R, n) each."""
+    return {name: averaged(a[f"{scene}.{method}.{name}"], SHARES[method]) for name in ("primal", "dx", "dy")}
+
+
+def gradient_error(a: Arrays, scene: str, method: str) -> Array:
+    """Variance of dx and dy, of every replica; (R,)."""
+    found = at_equal_rays(a, scene, method)
+    return spread([found["dx"], found["dy"]])
+
+
+def rebuilt(a: Arrays, scene: str, method: str) -> Array:
+    """L2 reconstruction of every replica from a method's own image and differences, (R, SIDE, SIDE)."""
+    found = at_equal_rays(a, scene, method)
+    shapes = {"primal": (SIDE, SIDE), "dx": (SIDE, SIDE - 1), "dy": (SIDE - 1, SIDE)}
+    primal, dx, dy = (found[name].reshape(-1, *shape) for name, shape in shapes.items())
+    return np.asarray(l2(primal, dx, dy))
+
+
+def primal(a: Arrays, scene: str) -> Array:
+    """The better image of ReSTIR without differences at about the same rays: with a round in space, or without."""
+    each = [averaged(a[f"{scene}.{name}.primal"], SHARES[name]) for name in ("after", "temporal")]
+    return min(each, key=lambda images: float(images.var(axis=0).mean())).reshape(-1, SIDE, SIDE)
+
+
+def bands(images: Array) -> tuple[Array, Array, Array]:
+    """Variance of images, (R,): all of it, below and above the frequency alpha."""
+    R = len(images)
+    noise = (images - images.mean(axis=0)) * np.sqrt(R / (R - 1))
+    low, high = band_powers(noise, ALPHA, MAP)
+    return (noise**2).mean(axis=MAP), low, high
+
+
+def check(a: Arrays) -> list[Claim]:
+    """Pair reuse against both others in every scene; reconstruction reported."""
+    claims = []
+    for scene in SCENES:
+        ours = gradient_error(a, scene, "with")
+        after, traced = (gradient_error(a, scene, method) for method in ("after", "path tracing"))
+        for name, theirs, limit in (("after", after, 0.8), ("path tracing", traced, 1.0)):
+            more = criteria.ratio_above(ours, theirs, 1)
+            outcome = criteria.ratio_below(ours, theirs, limit)
+            claims.append(Claim("GPT-F07", outcome, f"{scene}, with / {name}", counter=more, caveat=ONE_LEAF))
+        text = criteria.ratio_interval(after, traced)[2]
+        claims.append(Claim("GPT-F07", criteria.reported(text), f"{scene}, after / path tracing"))
+    return [*claims, *reconstruction(a)]
+
+
+ONE_LEAF = (
+    "In flatland only, of a still map.  The baseline shifts one leaf of each path tree; whole trees would cost it more "
+    "rays and give it less noise."
+)
+
+
+def reconstruction(a: Arrays) -> list[Claim]:
+    """Noise of the reconstruction against that of the primal image, and against the other gradients'."""
+    claims = []
+    for scene in SCENES:
+        ours, theirs = bands(rebuilt(a, scene, "with")), bands(primal(a, scene))
+        for k, band in enumerate(("all frequencies", "below alpha", "above alpha")):
+            text = criteria.ratio_interval(ours[k], theirs[k])[2]
+            claims.append(Claim("GPT-F08", criteria.reported(text), f"{scene}, L2 with / primal, {band}"))
+        for method in ("after", "path tracing"):
+            text = criteria.ratio_interval(ours[0], bands(rebuilt(a, scene, method))[0])[2]
+            claims.append(Claim("GPT-F08", criteria.reported(text), f"{scene}, L2 with / L2 {method}"))
+    return claims
+
+
+def draw(a: Arrays) -> "Picture":
+    """One replica's dx of every method, and their errors."""
+    picture, axes = style.panels(len(SCENES), 4, width=2.7, height=2.4)
+    for row, scene in zip(axes, SCENES, strict=True):
+        high = scale(a[f"{scene}.with.dx"])
+        for axis, method in zip(row, METHODS, strict=False):
+            image = at_equal_rays(a, scene, method)["dx"][0].reshape(SIDE, SIDE - 1)
+            shown = axis.imshow(image, vmin=-high, vmax=high, cmap="PuOr", origin="lower")
+            axis.set(title=f"{scene}: {method}", xlabel="pair of pixels", ylabel="pixel")
+            axis.grid(visible=False)
+        picture.colorbar(shown, ax=row[2], label="$I_{i+1} - I_i$ (radiance x radian)", shrink=0.8)
+        for method in METHODS:
+            row[3].bar(method, gradient_error(a, scene, method).mean(), **style.bar(method))
+        row[3].set(ylabel="variance ((radiance x radian)$^2$)", title=f"{scene}, equal rays")
+        row[3].tick_params(axis="x", labelrotation=20)
+        row[3].grid(axis="x", visible=False)
+    return picture
+
+
+def scale(dx: Array) -> float:
+    """The largest difference shown: of the mean image, and three standard deviations."""
+    return float(np.quantile(abs(dx.mean(axis=0)), 0.98) + 3 * dx.std(axis=0).mean())
+
+
+FIGURE = Figure(
+    id="GPT-F07",
+    title="Gradient images at equal rays",
+    world="flatland2d",
+    source="[GPT Fig. 7, 8; 5.1]",
+    claims=("GPT-F07", "GPT-F08"),
+    conditions=(
+        Conditions(
+            ("GPT-F07", "GPT-F08"),
+            "[GPT Fig. 7, 8; 5]",
+            Setup("real time", "moving", "all", "Classroom, Veach-Ajar, Kitchen"),
+            Setup("real time", "still", "all", "maps at a post, a slit, a checker floor"),
+            "A fluence map has no camera to move.  Light that its own rays meet is left out: it would hide all else.",
+        ),
+    ),
+    arm="method",
+    presets={"quick": {"replicas": 8}, "paper": {"replicas": 64}},
+    chunks=chunks,
+    compute=compute,
+    combine=combine,
+    draw=draw,
+    check=check,
+)

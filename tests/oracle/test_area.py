@@ -1,0 +1,321 @@
+"""Area reservoirs and gradient frames, exactly: cells that have a place on the film.  [GPT 4.3.1, Fig. 2b]"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from restir_ref.area import Displaced, area_temporal, overlapped, still
+from restir_ref.batch import Array
+from restir_ref.chance import Live
+from restir_ref.gradient import SIGNS, Pairs
+from restir_ref.gradient_loop import (
+    ACROSS_SIGNS,
+    SAME_SIGN,
+    GradientPreset,
+    Group,
+    first,
+    forward,
+    in_space,
+    in_time,
+    nearer,
+    sampled,
+    shaded,
+    step,
+)
+from restir_ref.integrals import NOWHERE, Pixels, Shifted
+from restir_ref.loop import Preset
+from restir_ref.oracle.cells import Frame, cells
+from restir_ref.oracle.laws import bias_of, expected_sum
+from restir_ref.oracle.scenes import Scene, offset
+from restir_ref.restir import initial, spatial
+from tests.oracle.pairs import labelled, largest_bias
+
+A, S = 2, 2
+K = A * S
+RING = np.array([[1, 0], [0, 1]])  # as many pairs as pixels, which enumeration asks for
+
+
+@dataclass(frozen=True, eq=False)
+class FilmFrame(Frame):
+    """Cell x = a S + s: the a-th of A equal places on the film, suffix s; x + K (a' + 1) is displaced to a'."""
+
+    labels: Array = None
+    """(I, A, S): shifts keep the label of a suffix; -1 where they are undefined."""
+
+    def displaced(self, x: Array, by: Array) -> Array:
+        return x + K * (1 + (x // S + np.rint(by[0] * A).astype(int)) % A)
+
+    def shift(self, x: Array, index: Array, to: Pixels) -> Shifted:
+        there: FilmFrame = to.of
+        i, j, cell = self.ids(index), there.ids(to.index), x % K
+        a, place = cell // S, np.where(x < K, cell // S, x // K - 1)
+        label = self.labels[i, a, cell % S]
+        y = place * S + (self.labels[j, place] == label[:, None]).argmax(axis=1)
+        stays = (i == j) & (a == place)
+        y = np.where(stays, cell, y)
+        defined = stays | ((label >= 0) & (self.labels[j, place, y % S] == label))
+        return Shifted(y, np.where(defined, self.cells.v[j, y] / self.cells.v[i, cell], 0))
+
+
+def film_scene(seed: int, n: int = 2) -> Scene:
+    """Two frames with holes in their shifts, dark cells, and unequal volumes."""
+    rng = np.random.default_rng(seed)
+    I = 2 * n
+    v, f = rng.uniform(0.3, 2, (I, K)), rng.uniform(0.2, 2, (I, K)) * (rng.random((I, K)) < 0.85)
+    labels = np.argsort(rng.random((I, A, S)), axis=-1)
+    labels = np.where(rng.random(labels.shape) < 0.85, labels, -1)
+    pdf = rng.uniform(0.3, 1, (1, I, K))
+    nowhere = np.full((I, I, K), -1)
+    tables = cells(v, f, pdf / (pdf * v).sum(axis=-1, keepdims=True), nowhere)
+    return Scene([FilmFrame(tables, n, t, labels) for t in range(2)])
+
+
+BY = np.array([[0.5, -0.5]])
+"""Either pixel overlaps both: pixel 0 by halves of 0 and 1, pixel 1 of 0 and 1."""
+
+
+def area_frames(scene: Scene, by: Array, kind=Displaced):
+    before, now = scene.frames
+
+    def loop(index, chance):
+        history = initial(Pixels(before, index), chance)
+        here = Pixels(kind(now, by), index)
+        there = kind(before, np.zeros((1, before.n)))
+        sources = [(Pixels(there, columns), share) for columns, share in overlapped((before.n,), by, index)]
+        X = area_temporal(initial(Pixels(now, index), chance), here, history, sources, chance)
+        return spatial(X, plain := Pixels(now, index), [offset(plain.of, index, 1)], chance)
+
+    return loop
+
+
+each_seed = pytest.mark.parametrize("seed", range(6))
+
+
+@pytest.mark.claims("GPT-A05", "COM-B05")
+@each_seed
+def test_area_reservoirs_are_unbiased_in_every_cell(seed) -> None:
+    scene = film_scene(seed)
+    assert abs(bias_of(area_frames(scene, BY), scene.v, scene.support)).max() < 1e-13
+
+
+class Ignored(Displaced):
+    """A mistake: on the way there the square is ignored, on the way back it is not."""
+
+    def shift(self, x, index, to):
+        if self.by.any():
+            return Displaced.shift(self, x, index, to)
+        return self.of.shift(x, index, Pixels(to.of.of, to.index))
+
+
+class Jittered(Displaced):
+    """A mistake: the place is drawn anew, here always the first one, with no density for it."""
+
+    def shift(self, x, index, to):
+        y = Displaced.shift(self, x, index, to)
+        return y if self.by.any() else Shifted(y.x % S, y.J)
+
+
+@pytest.mark.claims("GPT-A05")
+@pytest.mark.parametrize("kind", [Ignored, Jittered])
+def test_a_square_that_is_ignored_one_way_and_a_place_drawn_anew_are_noticed(kind) -> None:
+    bias = [abs(bias_of(area_frames(s, BY, kind), s.v, s.support)).max() for s in map(film_scene, range(3))]
+    assert max(bias) > 0.02
+
+
+# ---------------------------------------------------------------- which pixels a square overlaps
+
+
+def sources(shape, by, n=None) -> dict:
+    index = np.arange(int(np.prod(shape)) if n is None else n)
+    return [dict(zip(("columns", "share"), each, strict=True)) for each in overlapped(shape, np.array(by), index)]
+
+
+def test_a_whole_displacement_has_one_source() -> None:
+    (only,) = sources((4,), [[1.0, 1.0, -1.0, -2.0]])
+    assert only["columns"].tolist() == [1, 2, 1, 1]
+    assert (only["share"] == 1).all()
+
+
+def test_shares_of_a_square_are_areas_that_sum_to_one() -> None:
+    by = np.random.default_rng(1).uniform(-3, 3, (2, 20))
+    found = sources((4, 5), by)
+    assert len(found) == 4
+    assert sum(each["share"] for each in found) == pytest.approx(1, rel=1e-12)
+    corner = np.floor(by)
+    assert found[0]["share"] == pytest.approx((1 - (by - corner)).prod(axis=0), rel=1e-12)
+
+
+def test_columns_of_a_square_count_along_the_rows_of_each_replica() -> None:
+    by = np.array([[0.25], [1.5]]) * np.ones(6)
+    index = np.array([0, 6, 1])  # pixel (0, 0) of two replicas, and (0, 1)
+    columns = [each.tolist() for each, _ in overlapped((3, 2), by, index)]
+    assert columns == [[2, 8, 3], [4, 10, 5], [3, 9, NOWHERE], [5, 11, NOWHERE]]
+
+
+def test_what_the_previous_frame_did_not_show_has_no_source() -> None:
+    assert sources((3,), [[np.inf, 5.0, -5.0]]) == []
+    (only,) = sources((3,), [[np.inf, -1.0, 5.0]])
+    assert only["columns"].tolist() == [NOWHERE, 0, NOWHERE]
+
+
+def test_a_displacement_of_another_number_of_axes_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"a film of shape \(3, 4\) has 2 axes, but displacements have 1"):
+        overlapped((3, 4), np.zeros((1, 12)), np.arange(12))
+
+
+def test_there_and_back_is_the_same_place() -> None:
+    before, now = film_scene(0).frames
+    here, there = Displaced(now, BY), still(before, BY)
+    index, x = np.repeat([0, 1], K), np.tile(np.arange(K), 2)
+    y = there.shift(x, index, Pixels(here, index))
+    back = here.shift(y.x, index, Pixels(there, index))
+    assert (y.J > 0).any()
+    assert np.array_equal(back.x[y.J > 0], x[y.J > 0])
+    assert (y.J * back.J)[y.J > 0] == pytest.approx(1, rel=1e-12)
+
+
+# ---------------------------------------------------------------- gradient frames
+
+
+def ring(of, index, count, radius, chance):
+    return [offset(of, index, by) for by in range(1, count + 1)]
+
+
+PRESET = GradientPreset(Preset(1, 1, 1, 1, 3.0), Preset(1, 1, 1, 1, 3.0))
+
+
+def group(of: dict, by: Array = BY) -> Group:
+    return Group(of, (2,), by, ring, np.ones(2, dtype=bool))
+
+
+def pair_group(frame: Frame, *parts: str) -> Group:
+    return group({part: Pairs(frame, RING, SIGNS[part]) for part in parts})
+
+
+def pair_frames(scene: Scene, *parts: str, partners=SAME_SIGN, history: bool = True):
+    """The first part after temporal area reuse and spatial reuse, of candidates drawn once per pixel."""
+    before, now = (pair_group(frame, *parts) for frame in scene.frames)
+
+    def loop(index, chance):
+        at = len(index) // 2
+        Y = first(before, index, sampled(scene.frames[0], chance, 1, at), chance) if history else None
+        X = first(now, index, sampled(scene.now, chance, 1, at), chance)
+        if Y is not None:
+            X = in_time(now, X, (before, Y), PRESET.pairs, partners, chance)
+        return labelled(in_space(now, X, PRESET.pairs, partners, chance)[parts[0]], K)
+
+    return loop
+
+
+@pytest.mark.claims("GPT-A02", "GPT-E24")
+@pytest.mark.parametrize("part", SIGNS)
+@pytest.mark.parametrize("seed", range(2))
+def test_pairs_are_unbiased_over_two_frames_of_area_reuse_from_trees_that_all_pairs_share(part, seed) -> None:
+    scene = film_scene(seed)
+    assert largest_bias(pair_frames(scene, part), pair_group(scene.now, part).of[part], scene) < 1e-12
+
+
+def test_a_frame_of_pixels_alone_is_a_frame_of_area_reservoirs() -> None:
+    scene = film_scene(3)
+    views = [{"primal": group({"primal": frame})} for frame in scene.frames]
+
+    def loop(index, chance):
+        at = len(index) // 2
+        history = step(views[0], chance, GradientPreset(Preset(1, 0, 1, 1, 3.0), PRESET.pairs), at)
+        return step(views[1], chance, PRESET, at, (views[0], history))["primal"]["primal"]
+
+    assert abs(bias_of(loop, scene.v, scene.support)).max() < 1e-13
+
+
+@pytest.mark.claims("GPT-A09")
+@pytest.mark.parametrize("seed", range(2))
+def test_pairs_that_reuse_across_signs_are_unbiased(seed) -> None:
+    scene = film_scene(seed)
+    loop = pair_frames(scene, *SIGNS, partners=ACROSS_SIGNS, history=False)
+    assert largest_bias(loop, pair_group(scene.now, *SIGNS).of["positive"], scene) < 1e-12
+
+
+# ---------------------------------------------------------------- colour
+
+
+@dataclass(frozen=True, eq=False)
+class Coloured(FilmFrame):
+    """The same brightness in three channels, tinted by place and pixel."""
+
+    tint: Array = None
+    """(3, I, K), with mean 1."""
+
+    def contribution(self, index: Array, x: Array) -> Array:
+        return self.target(index, x) * self.tint[:, self.ids(index), x]
+
+
+def tinted(frame: FilmFrame) -> Coloured:
+    hues = np.tile([0.5, 1.0, 1.5], (*frame.cells.f.shape, 1))  # whose mean is 1 without rounding
+    tint = np.random.default_rng(9).permuted(hues, axis=-1)
+    return Coloured(frame.cells, frame.n, frame.t, frame.labels, np.moveaxis(tint, -1, 0))
+
+
+def grey_but_for_hue(scene: Scene) -> Coloured:
+    """Equally bright everywhere, so that no difference of any two paths has a mean."""
+    one, labels = np.ones((2 * scene.now.n, K)), np.tile(np.arange(S), (2 * scene.now.n, A, 1))
+    tables = cells(one, one, one[None] / K, scene.now.cells.shifts)
+    return tinted(FilmFrame(tables, scene.now.n, 1, labels))
+
+
+def coloured_bias(frame: Coloured) -> Array:
+    """Of both signs after spatial reuse, (3, pairs), over the sum of all light."""
+    at = pair_group(frame, *SIGNS)
+
+    def estimate(index, chance):
+        X = first(at, index, sampled(frame, chance, 1, len(index) // 2), chance)
+        return shaded(at, in_space(at, X, PRESET.pairs, SAME_SIGN, chance))
+
+    light = (frame.cells.f * frame.cells.v * frame.tint)[:, frame.ids(np.arange(2))].sum(axis=-1)
+    return (expected_sum(estimate, 2) - (light[:, RING[0]] - light[:, RING[1]])) / light.sum()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_differences_of_colours_are_unbiased_in_every_channel(seed) -> None:
+    assert abs(coloured_bias(tinted(film_scene(seed).now))).max() < 1e-13
+
+
+def test_a_difference_of_hue_alone_is_seen(monkeypatch) -> None:
+    frame = grey_but_for_hue(film_scene(0))
+    assert abs(coloured_bias(frame)).max() < 1e-13
+    monkeypatch.setattr("restir_ref.gradient.COLOURED", 0.0)
+    assert abs(coloured_bias(frame)).max() > 0.01
+
+
+# ---------------------------------------------------------------- who reuses in space
+
+
+def test_pairs_that_are_not_active_keep_what_they_have_and_draw_nothing() -> None:
+    frame = film_scene(1, n=4).now
+    active = np.array([True, False, False, True])
+    at = Group({"primal": frame}, (4,), np.zeros((1, 4)), ring, active)
+    index, chance = np.arange(4 * 50), Live(np.random.default_rng(1))
+    X = first(at, index, sampled(frame, chance, 1, 50), chance)
+    Y = in_space(at, X, PRESET.pixels, {"primal": ("primal",)}, chance)["primal"]
+    idle = ~np.tile(active, 50)
+    assert np.array_equal(Y.x[idle], X["primal"].x[idle])
+    assert np.array_equal(Y.W[idle], X["primal"].W[idle])
+    assert (Y.c[~idle] == 2).all()
+    assert (Y.c[idle] == 1).all()
+
+
+def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one() -> None:
+    found = forward((2, 3))
+    (dx, shape_x), (dy, shape_y) = found["dx"], found["dy"]
+    assert (shape_x, shape_y) == ((2, 2), (1, 3))
+    image = np.arange(6.0).reshape(2, 3) ** 2
+    assert np.array_equal(np.subtract(*image.ravel()[dx]).reshape(shape_x), np.diff(image, axis=1))
+    assert np.array_equal(np.subtract(*image.ravel()[dy]).reshape(shape_y), np.diff(image, axis=0))
+    assert forward((4,))["dx"][0].tolist() == [[1, 2, 3], [0, 1, 2]]
+    assert forward((2,), crops=2)["dx"][0].tolist() == [[1, 3], [0, 2]]
+
+
+@pytest.mark.claims("GPT-A04")
+def test_a_pair_moves_with_its_nearer_pixel() -> None:
+    by, depth = np.array([[0.0, 1.0, 2.0]]), np.array([3.0, 1.0, 2.0])
+    assert nearer(by, depth, forward((3,))["dx"][0]).tolist() == [[1.0, 1.0]]
