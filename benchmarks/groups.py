@@ -72,13 +72,18 @@ ORACLE = {
     "selected.probability: t = ...({P => W} > 0)...": UNDRAWN,
     "selected.probability: t = ...({P => n} > 0)...": UNDRAWN,
     "selected.probability: t = ...(P > {0 => -1})...": UNDRAWN,
+    "selected.total_variance: ...sum(axis={- => }1))": SHORT_TABLE,
+    "mutations: ...np.clip({x_new, 0 => 0, x_new}, K - 1)...": "max(a, b) = max(b, a)",
+    "scenes.random_scene: f = rng.choice([0.{0, 0.5 => 5, 0.0}...": "each is as likely",
+    "scenes.random_scene: ...for j in range({ => 1, }count)...": "nothing is below 0",
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }
 ELIMINATED = "elimination in another order"
 OF_THEORY = {
-    "metrics.neighbour_correlation: ...correlation(errors[..., {:-r], errors[..., r: => r:], errors[..., :-r}])...": (
-        "a correlation is symmetric"
-    ),
+    "metrics.neighbour_correlation: ...[..., {:-r], e[..., r: => r:], e[..., :-r}])...": "a correlation is symmetric",
+    "decorrelation.bounded: ...all(axis=0), 1.0 => 1.0, inside...": TRUTH,
+    "decorrelation.attempt: apart(move.{p_hat, move.p_hat_new => p_hat_new, move.p_hat}...": "apart is symmetric",
+    "batch.pick.refer: if {any(... => True}:": "the same columns, each input gathered before one is picked",
     "metrics._frequencies: ...{, sparse=True => }...": "the same numbers, in more memory",
     "images.spread_in_disk.around: ...k {* => /} GOLDEN...": "1 / GOLDEN is 1 + GOLDEN, the same modulo 1",
     "images.tiles: ...swapaxes({1, 2 => 2, 1})...": "swapping is symmetric",
@@ -103,7 +108,44 @@ OF_THEORY = {
     "poisson_l1.normal_equations: ...{w_g, gradients => gradients, w_g}...": "a product is symmetric",
     "poisson_l1.conjugate_gradients: ...dot({r, z => z, r})...": "a product is symmetric",
 }
+SYMMETRIC = "one and the other are treated alike"
+PRINTS = "a number prints alike, whatever its type"
+NAMED_FIRST = "which of two mistakes is named first"
+TRANSPORT = {
+    "reading._put_scattering: ...np.maximum(lobe, {0 => -1}))": "of ALL lobes, what one does is not used",
+    "shifts.shift_path: if {start < stop => True}:": "no columns are no work",
+    "shift_identity._means: ...((i <{ => =} j) == up)": "no path is shifted to its own pixel",
+    "direction_measure.direction_jacobian: ...{x => y}.c - 1, ...": "only asked where y reconnects where x does",
+}
+FLATLAND2D = {
+    "pictures.view: for pixel, u in ...({FILM - 1, 1.0 => 1.0, FILM - 1})):": "a place on the film is pixel + u",
+    "pictures.outline: lines = ...{scene.corners... => circles, *scene.corners...": "one collection in another order",
+    "sensors.FluenceMap.__post_init__: _check_points(self.{low, self.high => high, self.low})": NAMED_FIRST,
+    "sensors.Pinhole.__post_init__: _check_points(self.{eye, self.towards => towards, self.eye})": NAMED_FIRST,
+    "shift_pictures.pair: ...{int(path.c[0]) => path.c[0]}...": PRINTS,
+    "shift_pictures._vertices: common = ...": SYMMETRIC,
+    "radiosity: POINTS_AT_ONCE = ...": "the same numbers, in blocks of another size",
+    "radiosity.view: ...one]){, axis=1 => })...": "the last axis of a table is its axis 1",
+    "scenes.crease: ...{float(np.tan(np.radians(40) => np.tan(np.radians(40})...": PRINTS,
+    "scenes: ...{clear_coat, furnace => furnace, clear_coat}...": "scenes are found by name",
+    "tone.decoded: ...{np.maximum(t, 0.04045) => t}...": "tones are not negative",
+}
+TRACER3D = {
+    "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
+    "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,
+    "sensors.Pinhole.project: ...dot({right, to => to, right})...": SYMMETRIC,
+    "meshes.with_area: n = np.cross(sides[:, {1], sides[:, 2 => 2], sides[:, 1}])": "an area has no sign",
+    "witness: Description = ...": "a type",
+    "shapes.turned: x = ...{, dtype=float => }...": "less their mean, they are of that type",
+    "witness._rgb: ...{float(c) => c}...": PRINTS,
+    "cli._thumbnails: ...{unit='scene',  => }...": "words of a bar",
+    "cli._path_traced: ...{total=trees,  => }...": "words of a bar",
+}
 AUDIT = {
+    "cases.drawn: pick = {np.floor => }(...": "what is not negative is cut down to the same integer",
+    "compare.Check.worst: ...{float(expected) => expected}...": PRINTS,
+    "mistakes.against_old_sum: s, before = (np.zeros(len(terms.s){, dtype=int => }), ...": PRINTS,
+    "compare.Check.worst: columns = int(self.wrong.reshape(-{1 => 2}...": "any negative number will do",
     "load._check_values: for name in ('{u', 'u_stream => u_stream', 'u}'):": "which of two mistakes is named first",
     "mistakes.at_s: ...[{0 => -1}])": "the first of one row is the last",
     "mistakes.inputs_counted: ...len(p.{W => c})...": "as many confidences as weights",
@@ -119,6 +161,11 @@ ZOO = {
 TOY1D = {
     "walking.Walking.propose: ...np.clip({(x - low) / size, 0 => 0, (x - low) / size}, 1)...": "max(a, b) = max(b, a)",
     "line.Line.pixel: ...{if index.max(initial=0) < self.n else index  => }% self.n": "the same, more slowly",
+    "toys: ...{partial_shift, two_pairs => two_pairs, partial_shift}...": "toys are found by name",
+    "toys: ...{degrading_neighbours, overstating_neighbours => overstating_neighbours, degrading_neighbours}...": (
+        "toys are found by name"
+    ),
+    "line.quotient: ...[:, None], {0 => 1}.0)": "what is outside has density 0 all the same",
     "line.Line.pixel: ...initial={0 => 1}...": "of one pixel, the remainder is 0 as well",
     "line.Line.pixel: ...initial={0 => -1}...": "indices are not negative",
     "line._kept_cells: i, j = ...{:, None, None], ...[None, : => None, :, None]...": "shifts that keep z are symmetric",
@@ -160,11 +207,15 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         "zoo": Group(("restir_ref/oracle/zoo/*.py",), ("tests/oracle/test_*.py",), equivalent=ZOO),
         "audit": Group(("restir_ref/audit/*.py",), ("tests/audit/test_*.py",), equivalent=AUDIT),
         "transport": Group(
-            ("restir_ref/transport/**/*.py",), ("tests/transport/test_*.py", "tests/flatland/test_*.py")
+            ("restir_ref/transport/**/*.py",),
+            ("tests/transport/test_*.py", "tests/flatland/test_*.py"),
+            equivalent=TRANSPORT,
         ),
         "toy1d": Group(("toy1d/*.py",), ("tests/core/test_*.py", "tests/toy1d/test_*.py"), equivalent=TOY1D),
-        "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py",)),
-        "tracer3d": Group(("tracer3d/*.py",), ("tests/tracer3d/test_*.py", "tests/transport/test_spaces.py")),
+        "flatland2d": Group(("flatland2d/*.py",), ("tests/flatland/test_*.py",), equivalent=FLATLAND2D),
+        "tracer3d": Group(
+            ("tracer3d/*.py",), ("tests/tracer3d/test_*.py", "tests/transport/test_spaces.py"), equivalent=TRACER3D
+        ),
     }
 )
 

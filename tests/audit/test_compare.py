@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from restir_ref.audit import audit_dump
-from restir_ref.audit.compare import Check
+from restir_ref.audit.compare import Check, Wrong
 from restir_ref.audit.dump import RTOL
 from tests.audit.planted import M, fields
 from tests.audit.shader import dumped
@@ -61,6 +61,11 @@ def test_the_worst_error_is_the_largest_in_units_of_what_is_tolerated(tolerances
     compared = np.ones((1, 3), dtype=bool)
     worst = Check("w", nothing, found, compared, np.array([tolerances], dtype=float)).worst()
     assert (worst.where, worst.found) == ((0, place), found[0, place])
+
+
+@pytest.mark.parametrize(("columns", "said"), [(1, "(wrong in 1 column)"), (3, "(wrong in 3 columns)")])
+def test_a_wrong_term_says_in_how_many_columns(columns, said) -> None:
+    assert str(Wrong("w", (0, 2), 1.0, 2.0, columns)) == f"w[0] in column 2: expected 1, found 2 {said}"
 
 
 # ---------------------------------------------------------------- where

@@ -3,16 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from restir_ref.audit import CannotAudit, audit_estimator, estimator
+from restir_ref.audit import CannotAudit, audit_estimator, estimator, rehearsal
 from restir_ref.audit.engines import ENGINES
 from restir_ref.audit.estimator import TOLERANCE
 from restir_ref.audit.likeness import Signature, lookalikes, signatures
 from restir_ref.integrals import Pixels, Reservoirs
-from restir_ref.mis import ALL_CANONICAL, WEIGHTS
+from restir_ref.mis import ALL_CANONICAL, WEIGHTS, Confidences
 from restir_ref.oracle.cells import Frame, cells
 from restir_ref.oracle.scenes import (
     Scene,
@@ -177,3 +178,23 @@ def test_too_many_leaves_are_refused_with_an_estimate() -> None:
 def test_a_report_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         audit_estimator(right, SCENE).leaves = 0  # type: ignore[misc]
+
+
+def test_a_result_without_weights_is_refused_before_its_samples_are_looked_at() -> None:
+    with pytest.raises(CannotAudit, match="without samples x and weights W"):
+        rehearsal.checked(SimpleNamespace(x=np.zeros(2, dtype=int)), 2, 3)
+
+
+def test_two_runs_have_the_same_weights_only_if_all_calls_have() -> None:
+    def take(*asked):
+        return rehearsal.Take([np.array(each) for each in asked], np.zeros(1), np.zeros(1))
+
+    assert rehearsal._same_weights(take([1, 2], [3]), take([1, 2], [3]))
+    assert not rehearsal._same_weights(take([1, 2], [3]), take([1, 2], [4]))
+    assert not rehearsal._same_weights(take([1, 2]), take([1, 2], [3]))
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_where_nobody_has_confidence_an_engine_s_weights_are_zero_without_a_warning(name) -> None:
+    q, c = np.array([[1.0, 2.0], [3.0, 0.5]]), Confidences([np.zeros(2)] * 2, [0])
+    assert all((np.asarray(ENGINES[name].m(i, q.__getitem__, c)) == 0).all() for i in range(2))

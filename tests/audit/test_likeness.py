@@ -50,3 +50,10 @@ def test_a_bug_has_a_table_in_loops_that_are_biased_by_nothing_else(name, monkey
     found = list(signatures(reference_scene(), TOLERANCE))
     assert bool(found) == shown
     assert all(abs(each.bias).max() > TOLERANCE for each in found)
+
+
+def test_a_table_of_just_this_bias_is_the_same_at_tolerance_zero() -> None:
+    bias = np.array([[0.5, -0.25]])
+    (found,) = likeness.lookalikes(bias, [likeness.Signature("a bug", "a loop", bias)], 0.0)
+    assert found.same
+    assert not likeness.lookalikes(bias, [likeness.Signature("a bug", "a loop", 1.1 * bias)], 0.0)[0].same

@@ -173,6 +173,10 @@ def test_anything_over_zero_is_zero(zero):
     assert (ratio(np.array([0.0, 1.0, 3.0]), np.array([zero, zero, 2.0])) == [0, 0, 1.5]).all()
 
 
+def test_what_is_over_zero_is_a_plain_zero_without_a_sign():
+    assert not np.signbit(ratio(np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.0, 2.0]))).any()
+
+
 def test_plain_division_by_zero_is_noticed():
     with pytest.raises(RuntimeWarning, match="divide by zero"):
         np.array([1.0]) / np.array([0.0])

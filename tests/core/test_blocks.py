@@ -260,5 +260,23 @@ def test_shifts_from_one_image_to_one_other_are_one_call_and_what_several_would_
         assert y.J.tolist() == alone.J.tolist()
 
 
+@dataclass(frozen=True, eq=False)
+class Rigid:
+    """A shift with one Jacobian for all columns."""
+
+    J: float
+
+    def shift(self, x, index, to):
+        return Shifted(x, np.asarray(self.J))
+
+
+@pytest.mark.parametrize("J", [2.0, 0.5, 0.0])
+def test_one_jacobian_for_all_columns_is_that_of_every_column(J):
+    of, index = Rigid(J), np.array([0, 1])
+    here = [Pixels(of, index)] * 2
+    for y in shifted_together([wide(1, 2), wide(3, 4)], here, here):
+        assert y.J.tolist() == [J, J]
+
+
 def test_nothing_to_shift_is_no_call():
     assert list(shifted_together([], [], [])) == []

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from restir_ref import chance as chances
@@ -95,6 +95,7 @@ def test_a_window_that_draws_other_numbers_is_noticed(preset, wrong, monkeypatch
 
 
 @given(st.integers(1, 300), st.integers(2, 40), st.integers(1, 5))
+@example(tiles=4, size=2, step=5)
 def test_windows_cover_all_columns_in_order_and_none_is_narrow_or_lone(tiles, size, step):
     n = tiles * step
     cuts = list(windows.windows(n, size, step))

@@ -9,13 +9,16 @@ from matplotlib.figure import Figure
 from figures.gris import gris_f05
 from figures.report import style
 from figures.trust import flat_scenes
-from flatland2d import SCENES, pictures, shift_pictures
+from flatland2d import PLANE, SCENES, pictures, shift_pictures
+from flatland2d import fluence as fluences
 from flatland2d.fluence import direct, fluence, fluence_map
-from flatland2d.scenes import FURNACE_ALBEDO
+from flatland2d.scenes import FURNACE_ALBEDO, Setting, chain, matte, room
+from flatland2d.sensors import FluenceMap
 from flatland2d.tone import decoded, encoded, exposure, tone, untone
 from restir_ref.batch import take
 from restir_ref.transport.paths import RECONNECTION, REPLAY, Tracer, leaves, radiance, trace
 from restir_ref.transport.proofs.inversion import traced
+from restir_ref.transport.scene import scene
 from tests.core.stubs import live
 from tests.transport.paths import HYBRID, RULES
 
@@ -92,6 +95,35 @@ def test_the_wedge_is_what_the_inset_sees():
     np.testing.assert_allclose(to / np.linalg.norm(to, axis=0), w, atol=1e-12)
 
 
+def test_dotted_lines_are_the_borders_of_the_film():
+    setting = SCENES["glass_disc"]()
+    ends = [line.get_xydata() for line in drawn(pictures.scene_picture, setting).lines]
+    assert [end[0].tolist() for end in ends] == [list(setting.eye)] * 2
+    film = setting.pinhole(pictures.FILM, 0)
+    place = film.project(np.stack([end[1] for end in ends], axis=1))
+    np.testing.assert_allclose(place, [0, pictures.FILM], atol=1e-9)
+
+
+@pytest.mark.parametrize(("towards", "place"), [((0, 1), ("center", "bottom")), ((1, 0), ("left", "center"))])
+def test_a_word_stands_off_in_the_direction_it_is_sent(towards, place):
+    (text,) = drawn(pictures._word, "light", np.array([0.2, 0.3]), np.array(towards, dtype=float), 10).texts
+    assert (text.xy, text.xyann) == ((0.2, 0.3), (10 * towards[0], 10 * towards[1]))
+    assert (text.get_ha(), text.get_va()) == place
+
+
+def test_lengths_are_drawn_without_a_grid():
+    ax = drawn(pictures.scene_picture, SCENES["ajar"]())
+    assert not any(line.get_visible() for line in (*ax.get_xgridlines(), *ax.get_ygridlines()))
+
+
+@every_scene
+def test_the_box_of_a_map_holds_the_scene(scene):
+    setting = SCENES[scene]()
+    low, high = (np.array(each)[:, None, None] for each in (setting.low, setting.high))
+    corners = setting.scene.corners.transpose(1, 0, 2)
+    assert ((corners >= low - 0.01) & (corners <= high + 0.01)).all()
+
+
 def test_materials_differ_without_colour():
     dashes = [str(look["ls"]) for look in pictures.MATERIALS]
     assert len(set(dashes)) == len(dashes)
@@ -132,6 +164,16 @@ def test_a_bundle_draws_only_pieces_that_carry_light():
     _, carried = pictures.strands(t, u, pixel)
     ax = drawn(pictures.bundle_picture, SCENES["ajar"](), t, u, pixel)
     assert 0 < len(ax.collections[0].get_segments()) == (carried > 0).sum() < carried.size
+
+
+def test_the_more_light_a_piece_carries_the_darker_it_is_and_nothing_is_coloured():
+    t, u, pixel = bundle("ajar")
+    ax = drawn(pictures.bundle_picture, SCENES["ajar"](), t, u, pixel)
+    colours = ax.collections[0].get_colors()
+    assert (colours[:, :3] == 0).all()
+    assert (np.diff(colours[:, 3]) >= 0).all()
+    assert colours[-1, 3] > colours[0, 3] > 0
+    assert "eye" in [c.get_label() for c in ax.collections]
 
 
 # ---------------------------------------------------------------- fluence
@@ -198,6 +240,39 @@ def test_the_middle_of_a_map_takes_a_third_of_its_tones():
     assert np.ptp(np.percentile(tones, [10, 90])) > 0.3
     linear = np.clip(values / values.max(), 0, 1)
     assert np.ptp(np.percentile(linear, [10, 90])) < 0.3
+
+
+@pytest.mark.parametrize(("percentile", "ends"), [(99, [1, 99]), (90, [10, 90])])
+def test_a_map_shows_its_tones_between_percentiles(percentile, ends):
+    values = np.geomspace(1e-3, 1e3, 1001)
+    assert pictures.fluence_limits(values, percentile) == pytest.approx(tuple(np.percentile(values, ends)))
+
+
+def test_a_map_counts_its_pixels_along_rows_from_the_bottom():
+    sensor = FluenceMap((0, 0), (3, 2), columns=3, rows=2)
+    x, _, _ = sensor.ray(np.arange(6), np.full((3, 6), 0.5))
+    assert x.T.tolist() == [[column + 0.5, row + 0.5] for row in range(2) for column in range(3)]
+
+
+def test_directions_of_a_map_are_stratified_over_its_samples(monkeypatch):
+    asked = []
+
+    def noted(t, u, pixel):
+        asked.append(u[2])
+        return np.zeros((1, len(pixel)))
+
+    monkeypatch.setattr(fluences, "fluence", noted)
+    fluence_map(SCENES["ajar"](), 3, 2, 4, live())
+    assert [np.floor(4 * u).tolist() for u in asked] == [[k] * 6 for k in range(4)]
+
+
+def test_behind_a_lamp_that_hangs_in_the_room_nothing_is_darker_than_dark():
+    s = scene(PLANE, [matte(0.5)], [*room(0), *chain([(0.3, 0.5), (0.7, 0.5)], 0, 8.0)])
+    setting = Setting(s, (0.12, 0.45), (0.6, 0.0))
+    t = Tracer(s, setting.fluence(4, 4), setting.depth, RECONNECTION)
+    u, pixel = np.random.default_rng(3).random((t.D, 1600)), np.arange(1600) % 16
+    found = direct(t, trace(t, u, pixel), pixel)
+    assert found.min() == 0 < found.max()
 
 
 def test_an_even_map_stays_even_and_a_dark_one_has_a_scale():
@@ -277,6 +352,16 @@ def test_a_shift_picture_shows_the_vertices_of_both_paths(rule):
     names = {text.get_text() for text in ax.texts} - {"light"}
     assert (f"$x_{p.c} = y_{p.c}$" in names) == (p.c > 0)
     assert {"$x_1$", "$y_1$"} <= names
+
+
+def test_a_shift_picture_holds_the_box_of_its_setting():
+    t = gris_f05.tracer(RULES["hybrid"])
+    p = shift_pictures.pair(t, gris_f05.by_hand(t, 4), gris_f05.PIXEL, gris_f05.PIXEL + 60)
+    setting = gris_f05.corridor()
+    ax = drawn(shift_pictures.shift_picture, setting, p)
+    (left, low), (right, high) = setting.low, setting.high
+    assert ax.get_xlim()[0] < left < right < ax.get_xlim()[1]
+    assert ax.get_ylim()[0] < low < high < ax.get_ylim()[1]
 
 
 FULL = {"replay": [False] * 4, "hybrid": [False, False, True, True], "reconnection": [True] * 4}

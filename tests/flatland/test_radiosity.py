@@ -247,3 +247,20 @@ def test_double_counting_light_is_caught(monkeypatch) -> None:
     right = paths.ratio
     monkeypatch.setattr(paths, "ratio", lambda a, b: np.minimum(right(a, b) + 1, 1) if a.ndim == 1 else right(a, b))
     assert z_score(traced("matte_cornell", 16, seed=3), image("matte_cornell", PANELS).mean(), 0.02) > 8
+
+
+@pytest.mark.parametrize("scene", ["glass_disc", "glossy_cornell", "clear_coat"])
+def test_radiosity_refuses_what_is_not_grey_segments_of_lambert_lobes(scene) -> None:
+    with pytest.raises(ValueError, match="a monochrome scene of segments with Lambert lobes only"):
+        cut(SCENES[scene]().scene, 4)
+
+
+def test_a_point_without_walls_around_it_sees_from_horizon_to_horizon() -> None:
+    alone = compiled(PLANE, [matte(0.5)], chain([(0.1, 1.0), (-0.1, 1.0)], 0, 1.0))
+    seen = radiosity.view(alone, np.zeros((2, 1)), np.array([[0.0], [1.0]]))
+    assert (seen.s[0, 0], seen.s[0, -1]) == (-1, 1)
+    assert seen.V[0, -1].sum() == pytest.approx(0.2 / np.sqrt(1.01))
+
+
+def test_an_end_of_a_segment_where_the_point_is_itself_has_a_sine() -> None:
+    assert radiosity._sine(np.zeros((2, 1)), 1).tolist() == [1]

@@ -14,7 +14,7 @@ from flatland2d.scenes import LAMP, chain, matte, room
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
-from restir_ref.loop import random_in_row
+from restir_ref.loop import WHOLE, Passes, random_in_row
 from restir_ref.mis import Weights
 from restir_ref.restir import initial, shade
 from restir_ref.transport.baselines.restir_di import (
@@ -26,6 +26,7 @@ from restir_ref.transport.baselines.restir_di import (
     indirect_light,
     light_integrals,
     lit,
+    visibility,
 )
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, Tracer, Tree, first_hit, leaves, radiance, trace
@@ -150,3 +151,24 @@ def test_restir_di_stands_for_just_the_direct_light_of_path_tracing(scene) -> No
     )
     truth = mean_and_blocks(alone).mean(axis=0)
     assert all_unbiased(mean_and_blocks(ours - alone) + truth, truth, eps=0.02).passed
+
+
+def test_every_pass_is_given_samples_that_their_pixel_sees() -> None:
+    t, chance, given = tracer("many_lights"), Live(np.random.default_rng(4)), []
+
+    def noting(act):
+        def noted(X, here, *others, **more):
+            given.append((X.W * (1 - visibility(here, X.x))).max())
+            return act(X, here, *others, **more)
+
+        return noted
+
+    index = np.arange(8 * t.sensor.n)
+    here = Pixels(light_integrals(t, np.full((1, len(index)), CENTRE), index % t.sensor.n), index)
+    passes = Passes(WHOLE.initial, noting(WHOLE.temporal), noting(WHOLE.spatial))
+    X = direct_light(here, [], DEBIASED["talbot"], chance, passes=passes)
+    Y = direct_light(here, [], DEBIASED["talbot"], chance, X, [here], passes=passes)
+    assert given == [0, 0, 0]
+    assert (Y.W * (1 - visibility(here, Y.x)) == 0).all()
+    blind = WHOLE.initial(here, chance, CANDIDATES)
+    assert (blind.W * (1 - visibility(here, blind.x))).max() > 0

@@ -94,3 +94,30 @@ def test_dives_estimate_the_leaves_of_unequal_branches_without_bias() -> None:
 def test_more_combinations_than_integers_or_floats_hold_are_refused(one_by_one, n, count) -> None:
     with pytest.raises(ValueError, match=f"at least {count} leaves"):
         list(outcomes(ten_coins, n))
+
+
+def test_a_program_that_asks_less_than_before_is_refused() -> None:
+    runs = []
+
+    def forgetful(index, chance):
+        runs.append(index)
+        chance.choose(np.ones((2, len(index))))
+        if len(runs) < 3:
+            chance.choose(np.ones((2, len(index))))
+
+    with pytest.raises(ValueError, match=r"after 2 calls of choose\(\) were answered the program made only 1"):
+        list(outcomes(forgetful, 1))
+
+
+def splitmix(column: int, call: int) -> float:
+    """Its 53 high bits, in integers of any size.  [Steele, Lea, Flood 2014]"""
+    z = (column * 0x9E3779B97F4A7C15 + call * 0xD1B54A32D192ED03) % 2**64
+    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9 % 2**64
+    z = (z ^ z >> 27) * 0x94D049BB133111EB % 2**64
+    return ((z ^ z >> 31) >> 11) * 2.0**-53
+
+
+@pytest.mark.parametrize("call", [0, 1, 7, 1000])
+def test_scattered_numbers_are_those_of_splitmix(call) -> None:
+    column = np.arange(50) * 977
+    assert enumeration.scattered(column, call).tolist() == [splitmix(int(each), call) for each in column]

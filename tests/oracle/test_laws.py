@@ -7,7 +7,8 @@ import pytest
 
 from restir_ref.integrals import Reservoirs
 from restir_ref.mis import WEIGHTS
-from restir_ref.oracle.laws import bias_of
+from restir_ref.oracle import enumeration
+from restir_ref.oracle.laws import bias_of, expected_sum
 from restir_ref.oracle.scenes import spatial_loop, three_pixel_scene
 
 SCENE = three_pixel_scene()
@@ -44,3 +45,16 @@ def test_too_long_an_enumeration_is_refused_with_an_estimate_by_the_exact_bias_t
 
     with pytest.raises(ValueError, match=r"at least 1.073742e\+09 leaves, .* probably about 1.1e\+09 in all"):
         bias_of(thirty_tosses, np.ones((30, 2)), np.ones((30, 2)))
+
+
+def number(index, chance):
+    """0, 1, 2 or 3, as likely as 1 : 1 : 1 : 3."""
+    return chance.choose(np.array([[1.0], [1.0], [1.0], [3.0]]) * np.ones(len(index)))[None]
+
+
+def test_an_expected_sum_is_one_over_all_outcomes_and_no_more_than_are_allowed(monkeypatch):
+    monkeypatch.setattr(enumeration, "LANES_AT_ONCE", 1)
+    assert expected_sum(number, 1)[0] == pytest.approx([2.0])
+    assert expected_sum(number, 1, most_leaves=4)[0] == pytest.approx([2.0])
+    with pytest.raises(ValueError, match="more than the limit of 3"):
+        expected_sum(number, 1, most_leaves=3)

@@ -229,3 +229,9 @@ def test_a_negative_ratio_of_transition_densities_is_refused() -> None:
     here = Pixels(line, np.arange(2))
     with pytest.raises(ValueError, match="the ratio T"):
         mutate(initial(here, live()), here, live())
+
+
+def test_a_clamped_step_stays_in_the_unit_interval_and_meets_both_ends() -> None:
+    u, T = clamped(np.full((1, 200), 0.5), 2.0, live())
+    assert (u.min(), u.max()) == (0, np.nextafter(1, 0))
+    assert (T == 1).all()

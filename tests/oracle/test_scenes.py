@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from restir_ref.batch import Array
-from restir_ref.oracle.cells import Cells
+from restir_ref.oracle.cells import Cells, cells
 from restir_ref.oracle.scenes import (
     normalised,
     paired,
@@ -127,3 +127,19 @@ def test_random_scenes_are_of_the_size_of_their_model() -> None:
         assert [(each.t, each.n) for each in found.frames] == [(each.t, each.n) for each in like.frames]
         assert found.now.cells.pdf.shape == like.now.cells.pdf.shape
         assert (found.now.cells.proposal == 1 / like.v.shape[1]).all()
+
+
+def test_densities_of_random_scenes_are_as_one_two_and_four() -> None:
+    for each in drawn(50):
+        for row in each.pdf.reshape(-1, each.pdf.shape[-1]):
+            shares = row[row > 0] / row.max()
+            assert (np.isclose(shares[:, None], [0.25, 0.5, 1]).any(axis=1)).all()
+
+
+@pytest.mark.parametrize(("name", "what"), [("v", "volume v"), ("pdf", "density pdf"), ("f", "integrand f")])
+def test_a_negative_table_is_refused_by_its_name(name, what) -> None:
+    of = reference_scene().now.cells
+    tables = {each: getattr(of, each).copy() for each in ("v", "f", "pdf", "shifts")}
+    tables[name][(0,) * tables[name].ndim] = -1
+    with pytest.raises(ValueError, match=rf"the {what}.*Columns here are cells"):
+        cells(**tables)

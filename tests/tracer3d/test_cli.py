@@ -1,10 +1,12 @@
 """The command: what it writes, what it says of mistakes, and that Ctrl-C keeps what is done."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from tracer3d import cli, files, methods
+from tracer3d import cli, compare, files, methods
 from tracer3d.methods import METHODS
 from tracer3d.scenes import SCENES
 
@@ -153,3 +155,45 @@ def test_a_run_of_other_settings_is_not_overwritten(tmp_path, capsys):
     assert (tmp_path / "a.pfm").read_bytes() == before
     assert run(*command, "--seed", 9, "--anew") == 0
     assert (tmp_path / "a.pfm").read_bytes() != before
+
+
+# ---------------------------------------------------------------- what methods and sheets are made of
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_renders_a_picture_with_light(tmp_path, method):
+    assert run("render", "crease", "--method", method, "--frames", 1, *SMALL, "--out", tmp_path / "a.png") == 0
+    assert files.read_pfm(tmp_path / "a.pfm").max() > 0
+
+
+def test_thumbnails_make_their_folders(tmp_path):
+    assert cli._thumbnails(["crease"], tmp_path / "new" / "and below" / "t.png", trees=1) == 0
+    assert (tmp_path / "new" / "and below" / "t.png").exists()
+
+
+def rows_of_two() -> list[SimpleNamespace]:
+    """Two methods' pictures of 4 x 6 pixels, the second one wrong by a tenth."""
+    bright = np.linspace(0.5, 2, 24).reshape(1, 4, 6)
+    made = [("path", bright), ("restir-pt", 1.1 * bright)]
+    return [SimpleNamespace(method=m, picture=SimpleNamespace(mean=L, frames=3), rays=5, seconds=2) for m, L in made]
+
+
+def test_a_sheet_shows_every_picture_upright_and_its_error_below(tmp_path, monkeypatch):
+    sheets, rows = [], rows_of_two()
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, *_, **__: sheets.append(self))
+    compare.sheet(tmp_path / "s.png", rows, rows[0].picture.mean)
+    axes = np.array(sheets[0].axes).reshape(2, 3)
+    assert [len(ax.images) for ax in axes.flat] == [1, 1, 1, 0, 1, 1]
+    assert [ax.images[0].get_array().shape for ax in axes[0]] == [(4, 6, 3)] * 3
+    right, wrong = (np.asarray(ax.images[0].get_array()) for ax in axes[1, 1:])
+    assert (right == 0).all()
+    assert ((wrong > 0.09) & (wrong < 0.1)).all()
+    assert sheets[0].get_figwidth() == pytest.approx(2.4 * 3)
+
+
+def test_a_table_tells_the_errors_of_every_method():
+    rows = rows_of_two()
+    lines = compare.table(rows, rows[0].picture.mean).splitlines()
+    assert [float(each) for each in lines[1].split()[4:]] == [0, 0, 0]
+    assert all(float(each) > 0 for each in lines[2].split()[4:])
+    assert len(lines[2].split()) == 7

@@ -259,3 +259,9 @@ def test_a_face_that_trimesh_drops_is_noticed(tmp_path, monkeypatch):
     monkeypatch.setattr(meshes, "_by_trimesh", lambda *given: (right(*given)[0], right(*given)[1][1:]))
     with pytest.raises(ValueError, match=r"of its 6 faces 11 triangles can be read"):
         loaded(tmp_path, *CUBES["obj"])
+
+
+def test_of_binary_faces_all_or_none_are_fans_of_as_many_triangles():
+    head = b"ply\nformat binary_little_endian 1.0\nelement vertex 4\nelement face 2\nend_header"
+    complete = meshes._ply(head + bytes(60)).complete
+    assert [read for read in range(7) if complete(read)] == [2, 4, 6]

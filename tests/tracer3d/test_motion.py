@@ -8,7 +8,8 @@ import pytest
 from restir_ref.integrals import NOWHERE
 from restir_ref.transport.rays import arrive
 from tracer3d import SCENES, Pinhole
-from tracer3d.motion import Motion, motion, overlaps, sources
+from tracer3d.motion import Motion, mosaic_sources, motion, overlaps, sources
+from tracer3d.sensors import Mosaic
 
 every_scene = pytest.mark.parametrize("scene", SCENES)
 
@@ -148,3 +149,14 @@ def test_crops_of_different_sizes_name_columns_of_the_previous_one():
     assert m.seen.reshape(8, 16)[:, :8].all()
     assert not m.seen.reshape(8, 16)[:, 8:].any()
     assert (sources(m, np.arange(2 * 128)).reshape(2, 8, 16)[1, :, :8] == 64 + np.arange(64).reshape(8, 8)).all()
+
+
+def test_every_crop_of_a_mosaic_takes_history_from_its_own():
+    setting, corners = SCENES["crease"](), ((4, 8), (40, 20))
+    now, before = (
+        Mosaic(replace(each, width=12, height=8), corners)
+        for each in (setting.at(1).view(64, 36), setting.view(64, 36))
+    )
+    found = mosaic_sources(setting.scene, now, before)
+    alone = [motion(setting.scene, *pair).source for pair in zip(now.crops(), before.crops(), strict=True)]
+    assert found.tolist() == [*alone[0], *(alone[1] + 12 * 8)]

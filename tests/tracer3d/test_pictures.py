@@ -45,6 +45,17 @@ def test_an_exr_can_be_asked_for_and_holds_what_a_pfm_does(tmp_path):
 
 
 @needs_exr
+def test_of_an_exr_with_four_channels_three_are_read(tmp_path):
+    import OpenEXR  # noqa: PLC0415  (an extra)
+
+    pixels = np.arange(24, dtype=np.float32).reshape(2, 3, 4)
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, {"RGBA": pixels}).write(
+        str(tmp_path / "a.exr")
+    )
+    assert (files.read_linear(tmp_path / "a.exr") == pixels[:, :, :3].transpose(2, 0, 1)).all()
+
+
+@needs_exr
 def test_errors_against_an_exr_are_those_against_a_pfm(tmp_path, capsys):
     said = []
     for suffix in (".exr", ".pfm"):

@@ -12,11 +12,12 @@ from restir_ref.batch import Array
 from restir_ref.transport import materials, paths
 from restir_ref.transport.lobes import LOBES
 from restir_ref.transport.materials import Layer, Material
-from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
+from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit, radiance, scatter, trace
 from restir_ref.transport.scene import Ball, scene
 from restir_ref.transport.space import Space
 from tests.checkout import ROOT, modules, plant
 from tests.core.test_any_dimension import asks_for_a_dimension, names
+from tests.transport.furnished import FURNISHED, furnished_shifts
 from tests.transport.rooms import room, simplex, walls
 from tests.transport.spaces import SPACES
 
@@ -115,3 +116,15 @@ def test_glass_whose_choice_of_lobe_is_not_paid_for_is_seen(monkeypatch):
     wrong = replace(LOBES["glass transmission"], weight=LOBES["mirror"].weight)
     monkeypatch.setattr(materials, "LOBES", {**LOBES, "glass transmission": wrong})
     assert not np.isin(behind_glass(SPACES["plane"], 1.5).round(12), [0, 1]).all()
+
+
+@pytest.mark.parametrize("name", FURNISHED)
+def test_a_ray_leaves_in_the_direction_that_its_lobe_has_drawn(name):
+    s = furnished_shifts(name, RECONNECTION, 500, seed=5)
+    t, space, table = s.t, s.t.scene.space, s.t.scene.materials
+    v, _, _ = first_hit(t, s.x.u, s.i)
+    at = scatter(t, v, s.x.u, 1)
+    drawn = materials.sample_lobe(table, space, v, at.lobe, t.direction_numbers(s.x.u, 1))
+    kept = drawn[-1] != 0
+    assert kept.sum() > 100
+    np.testing.assert_allclose(space.to_local(v.n, at.w)[:, kept], drawn[:, kept], atol=1e-12)

@@ -1,6 +1,7 @@
 """What a reservoir has to keep: every shift of a path, from any pixel, follows from its compact record."""
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -125,6 +126,18 @@ def test_a_path_of_any_depth_can_be_stored(depth) -> None:
     last = replace(x, c=x.k + 1)
     assert (integers(pack(t, last)) == integers(last)).all()
     assert pack(t, x).k.dtype.itemsize == (1 if depth < 255 else 2)
+
+
+@pytest.mark.parametrize(("lobes", "size"), [(2, 1), (256, 1), (257, 2)])
+def test_lobes_take_a_byte_each_as_long_as_their_numbers_fit(lobes, size) -> None:
+    t, x, _ = deep_paths(10)
+    materials = SimpleNamespace(L=lobes)
+    many = SimpleNamespace(
+        sensor=t.sensor, depth=t.depth, scene=SimpleNamespace(space=t.scene.space, materials=materials)
+    )
+    kept = pack(many, replace(x, lobe_in=np.full(len(x.k), lobes - 1)))  # type: ignore[arg-type]
+    assert (kept.lobe_in == lobes - 1).all()
+    assert kept.lobe_in.dtype.itemsize == size
 
 
 @pytest.mark.parametrize(("dtype", "depth"), [(np.int8, 127), (np.int8, 128), (np.uint8, 255), (np.uint8, 300)])

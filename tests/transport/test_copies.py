@@ -23,10 +23,12 @@ from restir_ref.transport.proofs.copies import (
     COPIES,
     Copy,
     Copying,
+    copied_numbers,
     half_vector_stretch,
     mirrored_or_refracted,
     unit_stretch,
 )
+from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.proofs.reading import extended_path
 from restir_ref.transport.scene import Ball, scene
 from restir_ref.transport.space import Space
@@ -213,3 +215,25 @@ def test_two_rounds_of_reuse_with_copies_change_no_mean(name):
     error = added.std() / np.sqrt(replicas)
     assert error < 0.01 * start.mean()
     assert abs(added.mean()) < 4 * error
+
+
+def frosted_disc(x: float) -> Tracer:
+    """A disc of rough glass at this place in a box, seen by the whole film."""
+    layers = [Layer("rough reflection", (1.0,), 0.15), Layer("rough transmission", (1.0,), 0.15)]
+    facets = [*room(0), *chain(LAMP, 0, 8.0)]
+    s = scene(PLANE, [matte(0.6), Material(layers)], facets, [Ball((x, 0.25), 0.14, 1)])
+    return Tracer(s, Pinhole((0.12, 0.45), (0.6, 0.0), FILM, first=0), 4, REPLAY)
+
+
+@pytest.mark.parametrize("name", COPIES)
+def test_copies_lead_back_from_another_frame_whose_scene_has_moved(name):
+    now, then, rng, i = frosted_disc(0.5), frosted_disc(0.55), np.random.default_rng(8), np.arange(FILM)
+    k, nee = np.full(FILM, 4), np.ones(FILM, dtype=bool)
+    x = traced(now, rng.random((now.D, FILM)), i, k, nee)
+    u, J = copied_numbers(COPIES[name], now, x, i, then, i)
+    back, J_back = copied_numbers(COPIES[name], then, traced(then, u, i, k, nee), i, now, i)
+    both = (J > 0) & (J_back > 0)
+    assert both.sum() > FILM / 8
+    assert np.abs(back - x.u)[:, both].max() < 1e-6
+    assert np.abs(u - x.u)[:, both].max() > 0.01
+    np.testing.assert_allclose((J * J_back)[both], 1, rtol=1e-6)

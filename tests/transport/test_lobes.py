@@ -292,6 +292,16 @@ def test_delta_lobes_have_one_direction_and_no_density(space, name):
     assert lobe.invert(space, plain(), o, i).shape == u[0].shape
 
 
+@pytest.mark.parametrize("space", SPACES)
+def test_a_mirror_turns_directions_half_around_the_normal(space):
+    space = SPACES[space]
+    o = views(space.d, 100, np.random.default_rng(9))
+    i = LOBES["mirror"].sample(space, plain(), o, np.zeros((space.d - 1, 100)))
+    assert (i[:-1] == -o[:-1]).all()
+    assert (i[-1] == o[-1]).all()
+    assert (i[:-1] != o[:-1]).any()
+
+
 # ---------------------------------------------------------------- extremes
 
 

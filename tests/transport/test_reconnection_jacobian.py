@@ -11,16 +11,19 @@ from functools import cache
 import numpy as np
 import pytest
 
+from flatland2d import SCENES
 from restir_ref.batch import Array, ratio, take
-from restir_ref.integrals import Pixels
+from restir_ref.integrals import Pixels, Shifted
 from restir_ref.transport.paths import RECONNECTION
 from restir_ref.transport.proofs.direction_measure import Walk, reconnection_jacobian, shift_walk, walk
 from restir_ref.transport.proofs.reading import extended_path
 from restir_ref.transport.proofs.zoo import WRONG_SHIFTS
+from restir_ref.transport.proofs.zoo.ends import both_ends
+from restir_ref.transport.proofs.zoo.shifts import left_out
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.vectors import norm, normalize
 from tests.transport.furnished import furnished_shifts
-from tests.transport.paths import Shifts
+from tests.transport.paths import RULES, Shifts, shifts, successful
 from tests.transport.spaces import SPACES
 
 every_dimension = pytest.mark.parametrize("name", SPACES)
@@ -152,3 +155,12 @@ WRONG: dict[str, Callable[[Reconnected], Array]] = {
 @pytest.mark.parametrize("mistake", WRONG)
 def test_a_wrong_power_of_the_distance_or_swapped_ends_are_caught(mistake, name) -> None:
     assert np.median(errors(name, WRONG[mistake])) > 1e-3
+
+
+@pytest.mark.parametrize("scene", ["glossy_cornell", "clear_coat"])
+def test_the_ends_that_the_zoo_falsifies_give_the_jacobian_itself(scene):
+    s = successful(shifts(SCENES[scene](), RULES["hybrid"], 3000, seed=51))
+    of = PathIntegrals(s.t)
+    columns, x, y = both_ends(of, s.x, s.i, Shifted(s.y, s.J), Pixels(of, s.j))
+    assert len(columns) > 100
+    np.testing.assert_allclose(left_out(2, x, y), 1 / s.J[columns], rtol=1e-6)

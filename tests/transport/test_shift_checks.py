@@ -11,11 +11,11 @@ from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Shifted
 from restir_ref.transport.paths import RECONNECTION, Path, Tracer
 from restir_ref.transport.proofs import judge as judging
-from restir_ref.transport.proofs import shift_checks
+from restir_ref.transport.proofs import shift_checks, shift_identity, shift_slopes
 from restir_ref.transport.proofs.inversion import primary_sample
 from restir_ref.transport.proofs.judge import CHECKS, Shifting, judge
-from restir_ref.transport.proofs.shift_checks import Case, Effort, Trial, same_path
-from restir_ref.transport.proofs.shift_slopes import EXTREMES, STRATA, evenly, spread, stratum
+from restir_ref.transport.proofs.shift_checks import DERIVATIVES, Case, Effort, Trial, offender, same_path
+from restir_ref.transport.proofs.shift_slopes import EXTREMES, STRATA, evenly, finite_differences, spread, stratum
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.shifts import shift_path
 from tests.transport.paths import HYBRID, shifts
@@ -160,3 +160,66 @@ def test_few_paths_or_one_jacobian_are_no_trouble(J) -> None:
     found = spread(trial_of(J, np.ones(len(J), dtype=int)), 4)
     assert sorted(found) == sorted({*range(len(J))} if len(J) < 5 else {*found})
     assert len(found) == min(len(J), 4)
+
+
+def test_kinds_that_differ_in_where_they_reconnect_are_told_apart() -> None:
+    J, c = np.exp(np.random.default_rng(2).normal(0, 0.1, 5000)), np.where(np.arange(5000) % 1000 == 0, 2, 0)
+    of = trial_of(J, np.ones(5000, dtype=int))
+    chosen = spread(replace(of, x=replace(of.x, c=c)), 120)
+    assert {0, 1000, 2000} <= set(chosen[c[chosen] == 2])
+
+
+@pytest.mark.parametrize("low", [-5, 0, 3])
+def test_strata_of_log_j_are_equally_wide_wherever_it_begins(low) -> None:
+    J = np.exp(low + np.linspace(0, 2, 10 * STRATA, endpoint=False))
+    assert np.bincount(stratum(J), minlength=STRATA).tolist() == pytest.approx([10] * STRATA, abs=1)
+
+
+def test_two_steps_cancel_the_error_that_grows_with_their_square(monkeypatch) -> None:
+    """What remains is of fourth order: a stretch that is off by a h^2 is measured right."""
+    J = np.linspace(0.5, 2, 50)
+    case = Case(None, FEW, primary_sample, Live(np.random.default_rng(1)), trial_of(J, np.ones(50, dtype=int)))
+    off = DERIVATIVES / 10
+    monkeypatch.setattr(shift_slopes, "stretch", lambda case, at, h: at.J * (1 + off * (h / case.effort.step) ** 2))
+    found = finite_differences(case)
+    assert (found.tested, found.failed) == (50, 0)
+    assert found.worst < 1e-6
+    monkeypatch.setattr(shift_slopes, "stretch", lambda case, at, h: at.J * (1 + off * h / case.effort.step))
+    assert finite_differences(case).worst > 1e-3
+
+
+def test_an_offender_says_what_was_found_and_what_was_expected() -> None:
+    said = offender(trial_of(np.ones(3), np.ones(3, dtype=int)), 1, "J", 0.25, 4.0)
+    assert (said.what, said.found, said.expected) == ("J", 0.25, 4.0)
+
+
+def halved(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
+    y, J = shift_path(t, x, pixel)
+    return y, J / 2
+
+
+def doubled(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
+    y, J = shift_path(t, x, pixel)
+    return y, 2 * J
+
+
+@pytest.mark.parametrize("wrong", [halved, doubled])
+def test_who_offends_the_means_is_a_path_shifted_to_another_pixel(wrong) -> None:
+    of = Shifting(tracer("glossy_cornell", HYBRID), wrong)
+    found = judge(of, Live(np.random.default_rng(1)), FEW, checks={MEANS: CHECKS[MEANS]}).findings[MEANS]
+    assert found.offender.i != found.offender.j
+
+
+@pytest.mark.parametrize(("pixels", "reach", "apart"), [(40, 7, 7), (3, 7, 2)])
+def test_means_compare_pixels_as_far_apart_as_was_asked_for_and_there_are(pixels, reach, apart, monkeypatch) -> None:
+    asked = []
+
+    def noted(n: int, distance: Array, chance: Live) -> tuple[Array, Array]:
+        asked.extend(np.unique(distance))
+        return shift_checks.pairs(n, distance, chance)
+
+    monkeypatch.setattr(shift_identity, "pairs", noted)
+    t = tracer("glossy_cornell", HYBRID)
+    of = PathIntegrals(replace(t, sensor=replace(t.sensor, n=pixels)))
+    judge(of, Live(np.random.default_rng(1)), Effort(paths=500, reach=reach), checks={MEANS: CHECKS[MEANS]})
+    assert asked == [apart]
