@@ -90,25 +90,24 @@ def check(a: Arrays) -> list[Claim]:
         everywhere = [spread([a[f"{scene}.{arm}.dx"]]) for arm in ARMS]
         claims += [
             smaller(id_, (everywhere[2], everywhere[1]), 1.05, f"{scene}, adaptive / random neighbours, all pairs"),
-            smaller(id_, (ours, none), 0.9, f"{scene}, adaptive / no neighbours, edge pairs"),
+            beside(id_, (ours, none), f"{scene}, adaptive / no neighbours, edge pairs"),
             Claim(id_, criteria.above(saved(a, scene), 0.25), f"{scene}, rays of spatial reuse of pairs saved"),
         ]
-        if scene == "checker":
-            claims += [
-                smaller("GPT-F06", (ours, none), 1, f"{scene}, aligned / no neighbours, edge pairs"),
-                smaller("GPT-F06", (ours, random), 1, f"{scene}, aligned / random neighbours, edge pairs"),
-                unchanged(a, scene),
-            ]
+        claims += [
+            beside("GPT-F06", (ours, none), f"{scene}, aligned / no neighbours, edge pairs"),
+            beside("GPT-F06", (ours, random), f"{scene}, aligned / random neighbours, edge pairs"),
+        ]
     return claims
 
 
-def unchanged(a: Arrays, scene: str) -> Claim:
-    """Interior pairs reuse in space in neither arm."""
-    ours, none = (error(a, scene, arm, INTERIOR) for arm in ("adaptive", "no neighbours"))
-    part = f"{scene}, aligned / no neighbours, interior pairs"
-    if few(ours):
-        return Claim("GPT-F06", None, part, reason=few(ours))
-    return Claim("GPT-F06", criteria.ratio_within(ours, none, 0.9, 1.1), part)
+NO_EDGE = "A row has no neighbours on the same edge, only other edges: what the claim is about is judged in space."
+
+
+def beside(id_: str, pair: tuple[Array, Array], part: str) -> Claim:
+    """Reported: the effect is not in a row."""
+    if few(pair[0]):
+        return Claim(id_, None, part, reason=f"{few(pair[0])} {NO_EDGE}")
+    return Claim(id_, criteria.reported(criteria.ratio_interval(*pair)[2]), part, reason=NO_EDGE)
 
 
 def saved(a: Arrays, scene: str) -> float:
