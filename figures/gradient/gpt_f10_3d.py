@@ -3,8 +3,8 @@
 A floor of squares with a step, under a camera that moves by about a third of a pixel per frame.  Its edges are lines,
 so that an edge pair has neighbours on the same edge, which no row of pixels has.  Arms differ in the spatial reuse of
 pairs: none; all pairs with random neighbours; edge pairs alone, with neighbours that are edges of the same kind.  All
-are unbiased, so that the variance of dx and dy over replicas is their squared error.  The film has 320 columns: a radius of
-20 of 1920 pixels is 3 of them, and alike pairs are sought within 16.
+are unbiased, so that the variance of dx and dy over replicas is their squared error.  The film has 320 columns: a radius
+of 20 of 1920 pixels is 3 of them, and alike pairs are sought within 16.
 """
 
 from collections import Counter
@@ -98,8 +98,8 @@ def check(a: Arrays) -> list[Claim]:
 
 
 HISTORY = (
-    "The paper leaves the cap of history open; ours is 20.  With no history yet, in the first frame, neighbours that are "
-    "alike help; after a few frames the history of a pair is the better source, and they add the noise of choosing."
+    "The paper leaves the cap of history open; ours is 20.  With no history yet, in the first frame, neighbours that "
+    "are alike help; after a few frames the history of a pair is the better source, and they add the noise of choosing."
 )
 
 
