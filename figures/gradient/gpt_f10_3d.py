@@ -3,8 +3,8 @@
 A floor of squares with a step, under a camera that moves by about a third of a pixel per frame.  Its edges are lines,
 so that an edge pair has neighbours on the same edge, which no row of pixels has.  Arms differ in the spatial reuse of
 pairs: none; all pairs with random neighbours; edge pairs alone, with neighbours that are edges of the same kind.  All
-are unbiased, so that the variance of dx and dy over replicas is their squared error.  The film has 320 columns: a radius
-of 20 of 1920 pixels is 3 of them, and alike pairs are sought within 16.
+are unbiased, so that the variance of dx and dy over replicas is their squared error.  Of the film's 320 columns 3 are a
+radius of 20 pixels of 1920; alike pairs are sought within 16.
 """
 
 from collections import Counter
