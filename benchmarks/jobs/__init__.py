@@ -7,6 +7,7 @@ from types import MappingProxyType
 from benchmarks.jobs import (
     baselines,
     extremes,
+    gradients,
     indirect_references,
     means,
     offline,
@@ -33,6 +34,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "baselines": baselines.JOB,
         "offline": offline.JOB,
         "probes": probes.JOB,
+        "gradients": gradients.JOB,
         "witness": witness.JOB,
     }
 )
