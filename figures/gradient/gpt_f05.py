@@ -2,8 +2,9 @@
 
 The whole floor of squares in 480 pixels, under a camera that moves by .3 pixels per frame.  Both arms keep the place on
 the film with the sample.  By area, a pixel's square overlaps two previous pixels, and a sample's place moves as what it
-shows; by point, history is that of the nearest pixel and the place stays, so that what is reused was seen up to half a
-pixel away.  Both are unbiased; the variance of the last frame over replicas is the squared error.
+shows; by point, history is that of the nearest pixel, here the same one, and the place stays, so that what is reused
+was seen .3 pixels away, and after some frames further.  Both are unbiased; the variance of the last frame over replicas
+is the squared error.
 """
 
 from collections import Counter
@@ -69,11 +70,17 @@ def check(a: Arrays) -> list[Claim]:
         return [Claim("GPT-F05", None, part, reason=few(area)) for part in parts]
     return [
         smaller("GPT-F05", (area, point), 0.8, parts[0], POINT),
-        Claim("GPT-F05", more_than(primal, gradient), parts[1], counter=more_than(gradient, primal)),
+        Claim("GPT-F05", more_than(primal, gradient), parts[1], reason=ALIKE),
     ]
 
 
 POINT = "Point reuse of the paper fixes the primary hit; here it keeps the place within the pixel, as area reuse does."
+
+
+ALIKE = (
+    "Point reuse of the paper fixes the primary hit, which a pair has twice and a pixel once.  Here both arms move the "
+    "place of image and pair alike, so that most of this difference is not in the experiment."
+)
 
 
 def more_than(ours: Sequence[Array], theirs: Sequence[Array]) -> criteria.Outcome:
