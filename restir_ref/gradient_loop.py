@@ -1,8 +1,10 @@
 """Frames of a gradient renderer: the image and its pairs, each part with a reservoir of its own.  [GPT 4.1-4.4, Fig. 2]
 
 A `Group` is what reuses among itself: the pixels (one part, "primal"), the pairs of one direction (two parts,
-"positive" and "negative", or one, "magnitude").  One tree per pixel is drawn and read by all of them.  Then every part
-reuses in time, by area reservoirs, and in space.
+"positive" and "negative", or one, "magnitude").  Then every part reuses in time, by area reservoirs, and in space.
+
+One tree per pixel is drawn and read by all of them, which is ours: the paper draws for pairs anew, in a pass of their
+own.  It saves their rays; image and differences then share noise, and each pair has the candidates of both its pixels.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,7 +42,10 @@ UNSIGNED: Partners = MappingProxyType({"magnitude": ("magnitude",)})
 
 @dataclass(frozen=True)
 class GradientPreset:
-    """Parameters of a gradient renderer: of its pixels, of its pairs, and the parts these have."""
+    """Parameters of a gradient renderer: of its pixels, of its pairs, and the parts these have.
+
+    Pairs read the trees of the pixels, so that the number of their own does not count.
+    """
 
     pixels: Preset
     pairs: Preset
@@ -60,9 +65,11 @@ class Group:
 
     of      the integrals of every part
     shape   (rows, columns) of the image they form, or (n,) in a row
-    by      (film, n) where the previous frame showed each, in pixels from where it is now; inf where it did not
+    by      (film, n) where the previous frame showed each, in pixels from where it is; inf where there is no history
     around  how neighbours are chosen
     active  which (n,) reuse in space
+
+    Raises ValueError where these are not of as many pixels or pairs as the integrals.
     """
 
     of: Mapping[str, Film]
@@ -70,6 +77,14 @@ class Group:
     by: Array
     around: Around
     active: Array
+
+    def __post_init__(self) -> None:
+        for part, of in self.of.items():
+            if not of.n == self.by.shape[-1] == len(self.active) or of.n % int(np.prod(self.shape)):
+                raise ValueError(
+                    f"a group of {of.n} {part} integrals needs motion and activity of as many, and whole images: its "
+                    f"shape is {tuple(self.shape)}, `by` has {self.by.shape[-1]} columns, `active` {len(self.active)}."
+                )
 
     @property
     def n(self) -> int:
@@ -131,6 +146,11 @@ def in_time(
 ) -> Parts:
     """Every part with its partners' history in the previous pixels that it overlaps.  [GPT 4.3.1]"""
     before, Y = last
+    if tuple(before.shape) != tuple(group.shape) or before.n != group.n:
+        raise ValueError(
+            f"history of {before.n} pixels or pairs, shape {tuple(before.shape)}, has no places for {group.n} of shape "
+            f"{tuple(group.shape)}: keep the image's size, or start anew without history."
+        )
     index = np.arange(columns_of(X))
     sources, found = overlapped(before.shape, group.by, index), {}
     for part, of in group.of.items():

@@ -35,7 +35,7 @@ class Seen:
 
 
 def seen(scene: Scene, sensor: Sensor) -> Seen:
-    """One ray through the middle of every pixel."""
+    """One ray through the middle of every pixel, with .5 for all numbers: from a place without a lens, to one side."""
     x, w, _ = sensor.ray(np.arange(sensor.n), np.full((sensor.numbers, sensor.n), 0.5))
     v, t, met = arrive(scene, x, w)
     return Seen(albedo(scene.materials).mean(axis=0)[v.material], v.n, np.where(met, t, np.inf))

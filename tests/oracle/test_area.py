@@ -304,6 +304,22 @@ def test_pairs_that_are_not_active_keep_what_they_have_and_draw_nothing() -> Non
     assert (Y.c[idle] == 1).all()
 
 
+def test_groups_of_unequal_sizes_are_refused() -> None:
+    frame = film_scene(0).now
+    with pytest.raises(ValueError, match="`by` has 3 columns, `active` 2"):
+        group({"primal": frame}, np.zeros((1, 3)))
+    with pytest.raises(ValueError, match=r"its shape is \(3,\)"):
+        Group({"primal": frame}, (3,), BY, ring, np.ones(2, dtype=bool))
+
+
+def test_history_of_another_size_is_refused() -> None:
+    small, large = (film_scene(0, n).now for n in (2, 4))
+    there = Group({"primal": large}, (4,), np.zeros((1, 4)), ring, np.ones(4, dtype=bool))
+    X = {"primal": initial(Pixels(small, np.arange(2)), Live(np.random.default_rng(1)))}
+    with pytest.raises(ValueError, match=r"history of 4 pixels or pairs, shape \(4,\), has no places for 2"):
+        in_time(group({"primal": small}), X, (there, X), PRESET.pixels, {"primal": ("primal",)}, Live(None))
+
+
 def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one() -> None:
     found = forward((2, 3))
     (dx, shape_x), (dy, shape_y) = found["dx"], found["dy"]
