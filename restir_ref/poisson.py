@@ -14,7 +14,7 @@ L2 is linear, hence unbiased if its inputs are; `poisson_l1` is neither, and kee
 
 from collections.abc import Callable, Sequence
 from functools import reduce
-from math import prod
+from math import prod, tau
 from typing import Any
 
 import numpy as np
@@ -134,7 +134,7 @@ def l2(
 
 def symbol(shape: tuple[int, ...]) -> Array:
     """D(k) = sum over axes of 2 - 2 cos(pi k / n), the eigenvalues of grad^T grad; of this shape."""
-    along = [2 - 2 * np.cos(np.pi * np.arange(n) / n) for n in shape]
+    along = [2 - 2 * np.cos(tau * np.arange(n) / (2 * n)) for n in shape]
     return total([*np.meshgrid(*along, indexing="ij", sparse=True)])
 
 

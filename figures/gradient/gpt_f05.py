@@ -111,7 +111,7 @@ def draw(a: Arrays) -> "Picture":
     right.set_xticks([0, 1], ["dx", "image"])
     right.set(xlabel="what is estimated", ylabel="variance (radiance$^2$)", title="Mean over the row")
     right.grid(axis="x", visible=False)
-    right.legend()
+    style.below(right)
     return picture
 
 

@@ -121,7 +121,7 @@ def reconstruction(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """One replica's dx of every method, and their errors."""
-    picture, axes = style.panels(len(SCENES), 4, width=2.7, height=2.4)
+    picture, axes = style.panels(len(SCENES), 4, width=3.0, height=2.4)
     for row, scene in zip(axes, SCENES, strict=True):
         high = scale(a[f"{scene}.with.dx"])
         for axis, method in zip(row, METHODS, strict=False):
@@ -129,7 +129,7 @@ def draw(a: Arrays) -> "Picture":
             shown = axis.imshow(image, vmin=-high, vmax=high, cmap="PuOr", origin="lower")
             axis.set(title=f"{scene}: {method}", xlabel="pair of pixels", ylabel="pixel")
             axis.grid(visible=False)
-        picture.colorbar(shown, ax=row[2], label="$I_{i+1} - I_i$ (radiance x radian)", shrink=0.8)
+            picture.colorbar(shown, ax=axis, label="$I_{i+1} - I_i$ (rad. x radian)", shrink=0.8)
         for method in METHODS:
             row[3].bar(method, gradient_error(a, scene, method).mean(), **style.bar(method))
         row[3].set(ylabel="variance ((radiance x radian)$^2$)", title=f"{scene}, equal rays")

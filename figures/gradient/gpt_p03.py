@@ -29,7 +29,7 @@ SHOWN = (0.01, 0.1, 1.0)
 BANDS = np.array([0.1, 0.2, 0.4, 0.8, 1.2, 1.6])
 """Borders of bands of sqrt(D); the lowest begins at 0, the highest ends with the image's frequencies."""
 DIMENSIONS = {1: "1D", 2: "2D"}
-METHODS = ("primal", "L2", "L1")
+METHODS = ("primal", "Poisson L2", "Poisson L1")
 
 PRIMAL, GRADIENT, WRONG, SIZE = 0.3, 0.05, 0.03, 2.0
 """Standard deviations of the noise; the fraction of differences that are outliers, and by how much, up or down."""

@@ -143,13 +143,13 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
         # pixels of a pair, and their difference
         "$f_1$": Look(GREEN, "v", "-", ""),
         "$f_2$": Look(PURPLE, "P", "--", ""),
-        "after": Look(VERMILLION, "D", "--", "xx"),
+        "after": Look(SKY, "s", "--", "//"),
         "with": Look(BLUE, "o", "-", ""),
         "positivized": Look(INK, "^", "-.", ".."),
         # reconstructions
         "primal": Look(ORANGE, "s", "--", "//"),
-        "L2": Look(BLUE, "o", "-", ""),
-        "L1": Look(INK, "^", "-.", ".."),
+        "Poisson L2": Look(BLUE, "o", "-", ""),
+        "Poisson L1": Look(INK, "^", "-.", ".."),
         # mutations
         "right": Look(BLUE, "o", "-", ""),
         "W inverted": Look(ORANGE, "s", "--", ""),
