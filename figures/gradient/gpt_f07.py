@@ -129,7 +129,7 @@ def draw(a: Arrays) -> "Picture":
             shown = axis.imshow(image, vmin=-high, vmax=high, cmap="PuOr", origin="lower")
             axis.set(title=f"{scene}: {method}", xlabel="pair of pixels", ylabel="pixel")
             axis.grid(visible=False)
-            picture.colorbar(shown, ax=axis, label="$I_{i+1} - I_i$ (rad. x radian)", shrink=0.8)
+            picture.colorbar(shown, ax=axis, label="$I_{i+1} - I_i$, fluence", shrink=0.8)
         for method in METHODS:
             row[3].bar(method, gradient_error(a, scene, method).mean(), **style.bar(method))
         row[3].set(ylabel="variance ((radiance x radian)$^2$)", title=f"{scene}, equal rays")

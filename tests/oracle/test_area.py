@@ -11,7 +11,9 @@ from restir_ref.chance import Live
 from restir_ref.gradient import SIGNS, Pairs
 from restir_ref.gradient_loop import (
     ACROSS_SIGNS,
+    PARTS,
     SAME_SIGN,
+    UNSIGNED,
     GradientPreset,
     Group,
     first,
@@ -190,19 +192,18 @@ def group(of: dict, by: Array = BY) -> Group:
 
 
 def pair_group(frame: Frame, *parts: str) -> Group:
-    return group({part: Pairs(frame, RING, SIGNS[part]) for part in parts})
+    return group({part: Pairs(frame, RING, PARTS[part]) for part in parts})
 
 
-def pair_frames(scene: Scene, *parts: str, partners=SAME_SIGN, history: bool = True):
+def pair_frames(scene: Scene, *parts: str, partners=SAME_SIGN):
     """The first part after temporal area reuse and spatial reuse, of candidates drawn once per pixel."""
     before, now = (pair_group(frame, *parts) for frame in scene.frames)
 
     def loop(index, chance):
         at = len(index) // 2
-        Y = first(before, index, sampled(scene.frames[0], chance, 1, at), chance) if history else None
+        Y = first(before, index, sampled(scene.frames[0], chance, 1, at), chance)
         X = first(now, index, sampled(scene.now, chance, 1, at), chance)
-        if Y is not None:
-            X = in_time(now, X, (before, Y), PRESET.pairs, partners, chance)
+        X = in_time(now, X, (before, Y), PRESET.pairs, partners, chance)
         return labelled(in_space(now, X, PRESET.pairs, partners, chance)[parts[0]], K)
 
     return loop
@@ -230,10 +231,16 @@ def test_a_frame_of_pixels_alone_is_a_frame_of_area_reservoirs() -> None:
 
 @pytest.mark.claims("GPT-A09")
 @pytest.mark.parametrize("seed", range(2))
-def test_pairs_that_reuse_across_signs_are_unbiased(seed) -> None:
+def test_pairs_that_reuse_across_signs_are_unbiased_over_two_frames(seed) -> None:
     scene = film_scene(seed)
-    loop = pair_frames(scene, *SIGNS, partners=ACROSS_SIGNS, history=False)
+    loop = pair_frames(scene, *SIGNS, partners=ACROSS_SIGNS)
     assert largest_bias(loop, pair_group(scene.now, *SIGNS).of["positive"], scene) < 1e-12
+
+
+def test_pairs_with_one_reservoir_for_both_signs_are_unbiased_over_two_frames() -> None:
+    scene = film_scene(1)
+    loop = pair_frames(scene, "magnitude", partners=UNSIGNED)
+    assert largest_bias(loop, pair_group(scene.now, "magnitude").of["magnitude"], scene) < 1e-12
 
 
 # ---------------------------------------------------------------- colour
