@@ -1,0 +1,147 @@
+"""GPT Sec. 3.1 and 2.1: why differences of shifted paths are cheap, and what they do to the noise of an image.
+
+Gradient-domain path tracing of the occluder row, one tree per pixel.  A difference of two pixels has the variance
+Var + Var - 2 Cov: of paths that a shift correlates it is compared with that of independent ones, which is the sum of
+both pixels' variances.  Then the row is reconstructed from its image and differences (L2), and the power of the noise
+left is compared with that of the image, octave by octave.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from figures.claims import criteria
+from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
+from figures.experiments.gradients import NONE, gradient_view, path_traced
+from figures.experiments.references import reference
+from figures.experiments.views import setting, standard
+from figures.report import style
+from restir_ref.batch import Array
+from restir_ref.chance import Live
+from restir_ref.gradient_loop import GRADIENT, forward
+from restir_ref.poisson import cosine_power, l2
+from restir_ref.transport.edges import edges, seen
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
+
+SCENE, GROUPS = "occluders", 16
+"""The scene, and groups of replicas that are resampled for intervals."""
+
+
+def chunks(preset: Any) -> Sequence[dict[str, int]]:
+    """As many as there are blocks of replicas."""
+    return [{"block": block} for block in range(preset["blocks"])]
+
+
+def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
+    """Image and dx of one tree per pixel, (replicas, n)."""
+    sensor, asked = standard(SCENE), Counter[str]()
+    view = gradient_view(SCENE, (sensor, sensor), asked, GRADIENT, NONE)
+    found = path_traced([view], asked, preset["replicas"], Live(rng))
+    return {"primal": found["primal"], "dx": found["dx"]}
+
+
+def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
+    """All blocks, the reference, and which pairs are edges."""
+    sensor = standard(SCENE)
+    edge = edges(seen(setting(SCENE).scene, sensor), forward((sensor.n,))["dx"][0])
+    joined = {name: np.concatenate([part[name] for part in results]) for name in results[0]}
+    return joined | {"edge": edge, "reference": reference(SCENE).mean}
+
+
+def variances(a: Arrays, where: Array) -> tuple[Array, Array]:
+    """Of dx by shifted paths, and of differences of independent ones, means over pairs; (GROUPS,)."""
+    truth = a["reference"]
+    dx = (a["dx"] - np.diff(truth)) ** 2
+    pixel = (a["primal"] - truth) ** 2
+    independent = pixel[:, 1:] + pixel[:, :-1]
+    return tuple(in_groups(each[:, where].mean(axis=1)) for each in (dx, independent))  # type: ignore[return-value]
+
+
+def in_groups(values: Array) -> Array:
+    """Means of groups of replicas, (GROUPS,)."""
+    return np.asarray(values[: len(values) // GROUPS * GROUPS].reshape(GROUPS, -1).mean(axis=1))
+
+
+def octaves(a: Array, n: int) -> Array:
+    """Mean power in 1, 2-3, 4-7, ... half waves per row."""
+    return np.array([a[2**k : 2 ** (k + 1)].mean() for k in range(int(np.log2(n)))])
+
+
+def powers(a: Arrays) -> tuple[Array, Array]:
+    """Power of the noise of the image, and of its reconstruction, by octave."""
+    truth = a["reference"]
+    noise = [cosine_power(each - truth, 1).mean(axis=0) for each in (a["primal"], l2(a["primal"], a["dx"]))]
+    before, after = (octaves(each, len(truth)) for each in noise)
+    return before, after
+
+
+def check(a: Arrays) -> list[Claim]:
+    """Interior pairs judged, edge pairs beside them; the order of octaves."""
+    shifted, independent = variances(a, ~a["edge"])
+    at_edges = criteria.ratio_interval(*variances(a, a["edge"]))[2]
+    before, after = powers(a)
+    noise = float(variances(a, np.ones_like(a["edge"]))[0].mean() / ((a["primal"] - a["reference"]) ** 2).mean())
+    order = float(spearmanr(np.arange(len(before)), after / before).statistic)
+    return [
+        Claim("GPT-C04", criteria.ratio_below(shifted, independent, 0.1), "interior pairs, shifted / independent"),
+        Claim("GPT-C04", criteria.reported(at_edges), "edge pairs, shifted / independent", reason=FAILED),
+        Claim(
+            "GPT-C07",
+            criteria.below(order, -0.8),
+            "order of noise ratios by octave",
+            reason=f"s_g / s_c = {noise:.3f}, below .08 as asked.",
+        ),
+    ]
+
+
+FAILED = "Across an edge most shifts fail, and a failed shift leaves the whole difference of two pixels."
+
+
+def draw(a: Arrays) -> "Picture":
+    """Variances along the row, and noise by octave."""
+    picture, axes = style.panels(1, 2, width=4.2, height=3.0)
+    left, right = axes[0]
+    truth = a["reference"]
+    pixel = ((a["primal"] - truth) ** 2).mean(axis=0)
+    pair = np.arange(len(truth) - 1)
+    left.semilogy(
+        pair, ((a["dx"] - np.diff(truth)) ** 2).mean(axis=0), **style.nth(0, marker="", label="shifted paths")
+    )
+    left.semilogy(pair, pixel[1:] + pixel[:-1], **style.nth(1, marker="", label="independent paths"))
+    left.set(xlabel="pair of pixels", ylabel="variance of dx (radiance$^2$)", title="Occluder row, one tree per pixel")
+    left.legend()
+    before, after = powers(a)
+    middle = 1.5 * 2.0 ** np.arange(len(before))
+    right.loglog(middle, before, **style.look("primal"))
+    right.loglog(middle, after, **style.look("Poisson L2"))
+    right.set(xlabel="half waves per row", ylabel="power of the noise (radiance$^2$)", title="Noise by octave")
+    right.legend()
+    return picture
+
+
+FIGURE = Figure(
+    id="GPT-C04",
+    title="What shifted paths are good for",
+    world="flatland2d",
+    source="[GPT 2.1, 3.1]",
+    claims=("GPT-C04", "GPT-C07"),
+    conditions=(
+        Conditions(
+            ("GPT-C04", "GPT-C07"),
+            "[GPT 2.1, 3.1]",
+            Setup("offline", "still", "all", "not named"),
+            Setup("offline", "still", "all", "posts before a lit wall (FS5)"),
+        ),
+    ),
+    presets={"quick": {"blocks": 2, "replicas": 1024}, "paper": {"blocks": 32, "replicas": 1024}},
+    chunks=chunks,
+    compute=compute,
+    combine=combine,
+    draw=draw,
+    check=check,
+)
