@@ -130,7 +130,7 @@ FIGURE = Figure(
         ),
     ),
     arm="reuse",
-    presets={"quick": {"replicas": 4}, "paper": {"replicas": 128}},
+    presets={"quick": {"replicas": 2}, "paper": {"replicas": 128}},
     chunks=chunks,
     compute=compute,
     combine=combine,

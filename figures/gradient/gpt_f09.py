@@ -134,7 +134,7 @@ FIGURE = Figure(
         ),
     ),
     arm="reuse",
-    presets={"quick": {"replicas": {ROW: 4}}, "paper": {"replicas": {ROW: 192, MAP: 32}}},
+    presets={"quick": {"replicas": {ROW: 2}}, "paper": {"replicas": {ROW: 192, MAP: 32}}},
     chunks=chunks,
     compute=compute,
     combine=combine,

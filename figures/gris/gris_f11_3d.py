@@ -83,7 +83,7 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"path tracing": 144, "frames": 16},
+        "quick": {"path tracing": 72, "frames": 8},
         "paper": {"path tracing": 576, "frames": 64},
     },
     chunks=chunks,
