@@ -1,6 +1,6 @@
 """Area reservoirs and gradient frames, exactly: cells that have a place on the film.  [GPT 4.3.1, Fig. 2b]"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from restir_ref.chance import Live
 from restir_ref.gradient import SIGNS, Pairs
 from restir_ref.gradient_loop import (
     ACROSS_SIGNS,
+    GRADIENT,
     PARTS,
     SAME_SIGN,
     UNSIGNED,
@@ -30,7 +31,7 @@ from restir_ref.loop import Preset
 from restir_ref.oracle.cells import Frame, cells
 from restir_ref.oracle.laws import bias_of, expected_sum
 from restir_ref.oracle.scenes import Scene, offset
-from restir_ref.restir import initial, spatial
+from restir_ref.restir import initial, resample, spatial
 from tests.oracle.pairs import labelled, largest_bias
 
 A, S = 2, 2
@@ -342,3 +343,45 @@ def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one() -> None:
 def test_a_pair_moves_with_its_nearer_pixel() -> None:
     by, depth = np.array([[0.0, 1.0, 2.0]]), np.array([3.0, 1.0, 2.0])
     assert nearer(by, depth, forward((3,))["dx"][0]).tolist() == [[1.0, 1.0]]
+
+
+# ---------------------------------------------------------------- parameters
+
+
+@pytest.mark.claims("GPT-A05", part="confidences of the overlapped pixels")
+def test_overlapped_pixels_bring_their_shares_of_a_capped_confidence() -> None:
+    """A cap of 2 and shares of a half on either side: 1 + 2 / 2 + 2 / 2 in a row of two, that overlaps itself."""
+    before, now = film_scene(1).frames
+    index, chance = np.arange(2), Live(np.random.default_rng(1))
+    X, Y = ({"primal": replace(initial(Pixels(of, index), chance), c=c)} for of, c in ((now, ONE), (before, 9 * ONE)))
+    preset, partners = Preset(1, 0, 1, 1, 2.0), {"primal": ("primal",)}
+    found = in_time(group({"primal": now}), X, (group({"primal": before}), Y), preset, partners, chance)["primal"]
+    assert found.c.tolist() == [3.0, 3.0]
+    third = in_time(group({"primal": now}, BY / 2), X, (group({"primal": before}), Y), preset, partners, chance)[
+        "primal"
+    ]
+    assert third.c.tolist() == [3.0, 3.0]
+    edge = in_time(group({"primal": now}, -BY / 2), X, (group({"primal": before}), Y), preset, partners, chance)
+    assert edge["primal"].c.tolist() == [2.5, 2.5]  # a quarter of either square lies outside of the row
+
+
+ONE = np.ones(2)
+
+
+def test_several_trees_are_averaged() -> None:
+    frame = film_scene(0).now
+
+    def loop(index, chance):
+        return resample(sampled(frame, chance, 2, len(index) // 2), Pixels(frame, index), chance)
+
+    scene = film_scene(0)
+    assert abs(bias_of(loop, scene.v, scene.support)).max() < 1e-13
+
+
+@pytest.mark.claims("GPT-A10", part="numbers of candidates and neighbours; one tree is shared, which is ours")
+def test_the_preset_has_the_numbers_of_the_paper() -> None:
+    pixels, pairs = GRADIENT.pixels, GRADIENT.pairs
+    assert (pixels.trees, pixels.rounds, pixels.neighbours) == (1, 1, 2)
+    assert (pairs.trees, pairs.rounds, pairs.neighbours) == (1, 1, 1)
+    assert (pixels.cap, pixels.radius, pairs.cap, pairs.radius) == (20, 20, 20, 20)
+    assert GRADIENT.partners is SAME_SIGN
