@@ -115,7 +115,7 @@ def draw(a: Arrays) -> "Picture":
     right.set_xticks([0, 1], ["equal samples", "equal rays"])
     right.set(xlabel="what is equal", ylabel="variance of dx (radiance$^2$)", title="Mean over pairs")
     right.grid(axis="x", visible=False)
-    left.legend()
+    style.below(left, ncols=3)
     return picture
 
 
