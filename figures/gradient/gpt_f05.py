@@ -109,7 +109,9 @@ def draw(a: Arrays) -> "Picture":
         title="Checker floor, .3 pixels a frame",
     )
     right.set_xticks([0, 1], ["dx", "image"])
-    right.set(xlabel="what is estimated", ylabel="variance (radiance$^2$)", title="Mean over the row")
+    right.set(
+        xlabel="what is estimated", ylabel="variance (radiance$^2$)", title=f"Mean over the row, {len(dx)} replicas"
+    )
     right.grid(axis="x", visible=False)
     style.below(right)
     return picture

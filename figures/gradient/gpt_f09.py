@@ -113,7 +113,9 @@ def draw(a: Arrays) -> "Picture":
         right.bar(np.arange(2) + 0.27 * (k - 1), both, 0.25, bottom, label=arm, **look)
     left.set(xlabel="pair of pixels of the inset", ylabel="variance of dx, 9 pairs (radiance$^2$)", title="Moving rack")
     right.set_xticks([0, 1], ["equal samples", "equal rays"])
-    right.set(xlabel="what is equal", ylabel="variance of dx (radiance$^2$)", title="Mean over pairs")
+    right.set(
+        xlabel="what is equal", ylabel="variance of dx (radiance$^2$)", title=f"Mean over pairs, {len(dx)} replicas"
+    )
     right.grid(axis="x", visible=False)
     style.below(left, ncols=3)
     return picture

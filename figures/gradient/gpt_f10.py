@@ -152,7 +152,7 @@ def draw(a: Arrays) -> "Picture":
             right.bar(np.arange(2) + 0.27 * (k - 1), means, 0.25, label=arm, **look)
         left.set(xlabel="pair of pixels", ylabel="variance of dx (radiance$^2$)", title=f"{scene}, moving")
         right.set_xticks([0, 1], [EDGE, INTERIOR])
-        right.set(xlabel="pairs", ylabel="variance of dx (radiance$^2$)", title=f"{scene}: means")
+        right.set(xlabel="pairs", ylabel="variance of dx (radiance$^2$)", title=f"{scene}: means, {len(dx)} replicas")
         right.grid(axis="x", visible=False)
         right.legend()
     return picture
