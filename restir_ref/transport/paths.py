@@ -14,13 +14,17 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array, Block, entry, ratio
+from restir_ref.batch import Array, Block, entry, ratio, take
 from restir_ref.guards import whole
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.rays import GRAZING, arrive, emitted, light_pdf, sample_light
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import dot, norm
+
+
+CROWDED = 0.9
+"""Share of paths alive above which it costs more to leave out the others than to trace them."""
 
 
 class Sensor(Protocol):
@@ -244,17 +248,41 @@ def trace(t: Tracer, u: Array, pixel: Array) -> Tree:
     seen = Leaf(bare, bare, np.zeros(len(pixel)))
     vertices, scatters, distances, lights, hits, throughputs = [v], [], [r], [], [], [T]
     for i in range(1, t.depth + 1):
-        at = scatter(t, v, u, i)
-        lights.append(light_leaf(t, v, at.P, t.light_numbers(u, i)))
-        v, r, met = arrive(t.scene, v.x, at.w)
-        at = Scatter(at.lobe, at.P, at.w, at.weight * met, at.p, at.p_all)
+        at, light, v, r, hit = _bounce_alive(t, v, u, i, T)
         T = T * at.weight
-        hits.append(hit_leaf(t, v, r, at.p_all))
         vertices.append(v)
         scatters.append(at)
         distances.append(r)
+        lights.append(light)
+        hits.append(hit)
         throughputs.append(T)
     return Tree(u, vertices, scatters, distances, seen, lights, hits, throughputs)
+
+
+Bounce = tuple[Scatter, tuple[Leaf, Array], Vertex, Array, Leaf]
+"""What happens at x_i, its light sample, x_(i+1) and its distance, and what is emitted there."""
+
+
+def _bounce(t: Tracer, v: Vertex, u: Array, i: int) -> Bounce:
+    """Scatter at x_i, sample a light from it, and meet x_(i+1)."""
+    at = scatter(t, v, u, i)
+    light = light_leaf(t, v, at.P, t.light_numbers(u, i))
+    v, r, met = arrive(t.scene, v.x, at.w)
+    at = Scatter(at.lobe, at.P, at.w, at.weight * met, at.p, at.p_all)
+    return at, light, v, r, hit_leaf(t, v, r, at.p_all)
+
+
+def _bounce_alive(t: Tracer, v: Vertex, u: Array, i: int, T: Array) -> Bounce:
+    """The same, for no rays of paths that carry nothing any more: their columns repeat another's, times T = 0."""
+    alive = np.flatnonzero(T.any(axis=0))
+    n = T.shape[-1]
+    if len(alive) > CROWDED * n:
+        return _bounce(t, v, u, i)
+    alive = alive if len(alive) else np.arange(min(n, 1))
+    found: Bounce = _bounce(t, *take((v, u), alive), i)
+    column = np.zeros(n, dtype=int)
+    column[alive] = np.arange(len(alive))
+    return take(found, column)
 
 
 def first_hit(t: Tracer, u: Array, pixel: Array) -> tuple[Vertex, Array, Array]:
