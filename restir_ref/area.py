@@ -10,14 +10,14 @@ whichever pixel it comes from; the rest of the sample is shifted as ever.  The p
 (The paper refers to Area ReSTIR for all of this: the words are ours, and so are the choices where those were free.)
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array
+from restir_ref.batch import Array, pick
 from restir_ref.chance import Chance
 from restir_ref.integrals import NOWHERE, Image, Pixels, Reservoirs, Sample, Shifted
 from restir_ref.mis import WEIGHTS, Weights
@@ -95,6 +95,27 @@ def overlapped(shape: Sequence[int], by: Array, index: Array) -> list[Source]:
         if there.any():
             found.append((np.where(there, index + (step * strides[:, None]).sum(axis=0), NOWHERE), share))
     return found
+
+
+Overlap = Callable[[Sequence[Source], Chance], Sequence[Source]]
+"""Which of the overlapped pixels are asked: `every` one, or `one_by_area`."""
+
+
+def every(sources: Sequence[Source], chance: Chance) -> Sequence[Source]:
+    """All of them: M pixels take M (M + 1) shifts with weights that compare all, 20 in an image.  [Zhang 2024]"""
+    return sources
+
+
+def one_by_area(sources: Sequence[Source], chance: Chance) -> Sequence[Source]:
+    """One of them, chosen by its share of the area, for all of them: 2 shifts.  [ours]
+
+    The choice knows areas and no samples, so that whatever is unbiased for each pixel is unbiased for one of them.
+    """
+    if len(sources) < 2:  # nothing to choose from
+        return [(columns, np.ones(len(columns))) for columns, _ in sources]
+    s = chance.choose(np.stack([share * (columns != NOWHERE) for columns, share in sources]))
+    chosen = pick([columns for columns, _ in sources], s)
+    return [(chosen, np.ones(len(chosen)))]
 
 
 def still(of: Film, by: Array) -> Displaced:

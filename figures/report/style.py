@@ -146,6 +146,7 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
         "after": Look(SKY, "s", "--", "//"),
         "with": Look(BLUE, "o", "-", ""),
         "positivized": Look(INK, "^", "-.", ".."),
+        "image alone": Look(GREEN, "v", LINES[4], "xx"),
         # reconstructions
         "primal": Look(ORANGE, "s", "--", "//"),
         "Poisson L2": Look(BLUE, "o", "-", ""),

@@ -22,7 +22,6 @@ from restir_ref.transport.rays import GRAZING, arrive, emitted, light_pdf, sampl
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.vectors import dot, norm
 
-
 CROWDED = 0.9
 """Share of paths alive above which it costs more to leave out the others than to trace them."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from restir_ref.area import Displaced, area_temporal, overlapped, still
+from restir_ref.area import Displaced, area_temporal, one_by_area, overlapped, still
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.gradient import SIGNS, Pairs
@@ -124,6 +124,55 @@ class Jittered(Displaced):
 def test_a_square_that_is_ignored_one_way_and_a_place_drawn_anew_are_noticed(kind) -> None:
     bias = [abs(bias_of(area_frames(s, BY, kind), s.v, s.support)).max() for s in map(film_scene, range(3))]
     assert max(bias) > 0.02
+
+
+def chosen_frames(scene: Scene, choice):
+    """Two frames of area reuse, where the choice says which of the overlapped pixels are asked."""
+    before, now = scene.frames
+
+    def loop(index, chance):
+        history = initial(Pixels(before, index), chance)
+        here, there = Pixels(Displaced(now, BY), index), still(before, BY)
+        sources = choice(overlapped((before.n,), BY, index), chance, history)
+        at = [(Pixels(there, columns), share) for columns, share in sources]
+        return area_temporal(initial(Pixels(now, index), chance), here, history, at, chance)
+
+    return loop
+
+
+def the_bright_one(sources, chance, history):
+    """A mistake: the overlapped pixel whose sample weighs more."""
+    (one, share), (other, _) = sources
+    W = history.W
+    return [(np.where(W.take(one) >= W.take(other), one, other), np.ones(len(share)))]
+
+
+@pytest.mark.claims("GPT-A05")
+@each_seed
+def test_one_of_the_overlapped_pixels_chosen_by_area_is_unbiased_in_every_cell(seed) -> None:
+    scene = film_scene(seed)
+    loop = chosen_frames(scene, lambda sources, chance, _: one_by_area(sources, chance))
+    assert abs(bias_of(loop, scene.v, scene.support)).max() < 1e-13
+
+
+def test_a_choice_among_overlapped_pixels_by_their_samples_is_noticed() -> None:
+    bias = [abs(bias_of(chosen_frames(s, the_bright_one), s.v, s.support)).max() for s in map(film_scene, range(3))]
+    assert min(bias) > 0.02
+
+
+def test_one_pixel_is_chosen_as_often_as_its_share_of_the_area_and_never_one_that_is_not_there() -> None:
+    index, by = np.arange(40000), np.array([[-0.3, 0.7, 0.2, 0.7]])
+    sources = overlapped((4,), by, index)
+    ((columns, shares),) = one_by_area(sources, Live(np.random.default_rng(1)))
+    assert (shares == 1).all()
+    assert (columns[index % 4 == 0] == index[index % 4 == 0]).all()
+    assert (columns[index % 4 == 1] % 4 == 2).mean() == pytest.approx(0.7, abs=0.02)
+    assert (columns[index % 4 == 3] == index[index % 4 == 3]).all()
+    alone = overlapped((4,), np.zeros((1, 4)), np.arange(4))
+    ((same, whole),) = one_by_area(alone, Live(np.random.default_rng(1)))
+    assert np.array_equal(same, np.arange(4))
+    assert (whole == 1).all()
+    assert one_by_area([], Live(np.random.default_rng(1))) == []
 
 
 # ---------------------------------------------------------------- which pixels a square overlaps
