@@ -6,7 +6,8 @@ what the differences repair, band by band, how large the largest errors of diffe
 bias.  Differences are unbiased, so that variances over replicas are squared errors.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -156,12 +157,14 @@ def repaired(a: Arrays) -> list[Claim]:
     text = f"s_g / s_c = {s_g:.3g}; were all noise white, {below:.3g} below and {above:.3g} above"
     claims = [Claim("GPT-P06", criteria.reported(text), "noise of differences over that of pixels, and prediction")]
     for k, (band, low, high) in enumerate((("below", 0.8, 1.2), ("above", 0.0, 0.5))):
-        part = f"power after / before, {band} alpha"
-        if few(before[0]):
-            claims.append(Claim("GPT-P06", None, part, reason=few(before[0])))
-        else:
-            claims.append(Claim("GPT-P06", criteria.ratio_within(after[k], before[k], low, high), part, caveat=WHITE))
+        within = partial(criteria.ratio_within, after[k], before[k], low, high)
+        claims.append(judged("GPT-P06", f"power after / before, {band} alpha", few(before[0]), within, WHITE))
     return claims
+
+
+def judged(id_: str, part: str, why_not: str, outcome: Callable[[], criteria.Outcome], caveat: str = "") -> Claim:
+    """A claim of an outcome, unless there is a reason why it cannot be judged."""
+    return Claim(id_, None, part, reason=why_not) if why_not else Claim(id_, outcome(), part, caveat=caveat)
 
 
 WHITE = "The criterion's limits are those of white noise with s_g / s_c below .15."
@@ -172,13 +175,12 @@ def biases(a: Arrays) -> list[Claim]:
     truth, claims = a["reference"], []
     halves = np.sign(truth - np.median(truth))
     l2_row, l1_row = (rebuilt_row(a, norm) for norm in (l2, l1))
-    if few(l2_row):
-        return [Claim("GPT-C03", None, "L2 and L1, mean of the occluder row", reason=few(l2_row))]
     for part, probe in (("mean of the occluder row", np.ones_like(truth)), ("bright less dark half", halves)):
-        mean = float((truth * probe).mean())
-        claims.append(Claim("GPT-C03", criteria.unbiased((l2_row * probe).mean(axis=1), mean), f"L2, {part}"))
-        off = f"{(l1_row * probe).mean() / mean - 1:+.2%}"
-        claims.append(Claim("GPT-C03", criteria.reported(off), f"bias of L1, {part}"))
+        mean, why_not = float((truth * probe).mean()), few(l2_row)
+        unbiased = partial(criteria.unbiased, (l2_row * probe).mean(axis=1), mean)
+        off = partial(criteria.reported, f"{(l1_row * probe).mean() / mean - 1:+.2%}")
+        claims.append(judged("GPT-C03", f"L2, {part}", why_not, unbiased))
+        claims.append(judged("GPT-C03", f"bias of L1, {part}", why_not, off))
     return claims
 
 
@@ -186,12 +188,11 @@ def outliers(a: Arrays) -> list[Claim]:
     """Large errors of differences by pair reuse against those after ReSTIR, at equal samples."""
     ours, theirs = (abs(a[f"{ROW_VIEW}.{method}.dx"] - np.diff(a["reference"])) for method in ("with", "after"))
     theirs, part = theirs[: len(ours)], f"{HIGHEST}th percentile of the error of dx, with / after, equal samples"
-    if few(ours):
-        return [Claim(id_, None, part, reason=few(ours)) for id_ in ("GPT-F08o", "GPT-C05")]
     text = " and ".join(f"{kurtosis(each.ravel(), fisher=False):.0f}" for each in (ours, theirs))
+    tails, told = partial(percentile_ratio, ours, theirs, 0.7), partial(criteria.reported, text)
     return [
-        Claim("GPT-F08o", percentile_ratio(ours, theirs, 0.7), part),
-        Claim("GPT-F08o", criteria.reported(text), "kurtosis of the error of dx, with and after"),
+        judged("GPT-F08o", part, few(ours), tails),
+        judged("GPT-F08o", "kurtosis of the error of dx, with and after", few(ours), told),
         smaller("GPT-C05", ((ours**2).mean(axis=1), (theirs**2).mean(axis=1)), 1, "with / after, equal samples"),
     ]
 

@@ -175,7 +175,8 @@ def test_an_edge_is_a_difference_of_albedo_of_normals_or_of_depth_and_nothing_el
 # ---------------------------------------------------------------- frames
 
 
-@pytest.mark.claims("GPT-A02", "GPT-A05")
+@pytest.mark.claims("GPT-A02", "GPT-A05", "GPT-F02")
+@pytest.mark.claims("GPT-A13", part="the image, to 2%")
 def test_a_camera_that_pans_by_fractions_leaves_image_and_differences_unbiased() -> None:
     """Eight frames, 96 pixels of a checker floor with three borders; errors over the mean of |dx|."""
     last = sensors_of("checker row")[-1]

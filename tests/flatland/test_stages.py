@@ -90,7 +90,7 @@ def largest_difference(rule: str, scene: str) -> float:
     return worst
 
 
-@pytest.mark.claims("GRIS-E32")
+@pytest.mark.claims("GRIS-E32", "GPT-E10")
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("scene", ["glossy_cornell", "glass_disc"])
 def test_the_estimate_is_the_sum_of_weights_in_every_pixel_of_every_frame(scene, rule) -> None:

@@ -157,7 +157,7 @@ def spread_of_scalar_identity(mis: Weights) -> float:
     return max(errors)
 
 
-@pytest.mark.claims("GRIS-E32")
+@pytest.mark.claims("GRIS-E32", "GPT-E10")
 @every_robust_weight
 def test_an_integrand_proportional_to_the_target_is_estimated_by_the_sum_of_weights_alone(mis) -> None:
     assert spread_of_scalar_identity(mis) < 1e-13

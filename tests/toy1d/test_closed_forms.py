@@ -109,7 +109,7 @@ def evenly(here: Pixels) -> Array:
     return shade(resample(drawn, here, live(3)), here)[0]
 
 
-@pytest.mark.claims("GRIS-E05")
+@pytest.mark.claims("GRIS-E05", "GPT-E05")
 @pytest.mark.parametrize("pixel", [0, 1])
 def test_ris_with_three_densities_is_unbiased_and_with_even_weights_is_not(pixel):
     line = known_densities()
