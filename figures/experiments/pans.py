@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from figures.experiments.flatland import displaced
 from figures.experiments.gradients import Spatial, around, gradient_view, reusing
 from figures.experiments.views import HYBRID, setting
 from flatland2d.sensors import Pinhole
-from restir_ref.area import one_by_area
 from restir_ref.batch import Array
 from restir_ref.gradient_loop import PRIMAL, GradientPreset, Group, View, forward, nearer, pairs_of
 from restir_ref.transport.counting import counted
@@ -18,7 +18,6 @@ from restir_ref.transport.edges import seen
 from restir_ref.transport.paths import Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
 from tracer3d.motion import motion
-from tracer3d.scenes import Setting
 from tracer3d.scenes import checker as floor
 from tracer3d.sensors import Pinhole as Pinhole3
 
@@ -50,15 +49,10 @@ def floor_views(frames: int, preset: GradientPreset, spatial: Spatial, asked: Co
     _, right, _ = last.axes()
     moves = [(k - frames + 1) * SIDEWAYS * right[:, 0] for k in range(frames)]
     sensors = [replace(last, eye=_moved(last.eye, by), towards=_moved(last.towards, by)) for by in moves]
-    return views_in_space(s, sensors, preset, spatial, asked)
-
-
-def views_in_space(
-    s: Setting, sensors: Sequence[Pinhole3], preset: GradientPreset, spatial: Spatial, asked: Counter[str]
-) -> list[View]:
-    """The frame of every sensor after that of the one before, with pairs along rows and columns."""
-    moves = zip(sensors, [sensors[0], *sensors], strict=False)
-    return [paired(s, each, asked, preset, spatial) for each in moves]
+    views = []
+    for sensor, before in zip(sensors, [sensors[0], *sensors], strict=False):
+        views.append(paired(s, (sensor, before), asked, preset, spatial))
+    return views
 
 
 def _moved(point: Sequence[float], by: Array) -> tuple[float, float, float]:
@@ -67,7 +61,7 @@ def _moved(point: Sequence[float], by: Array) -> tuple[float, float, float]:
 
 
 def paired(
-    s: Setting, moves: tuple[Pinhole3, Pinhole3], asked: Counter[str], preset: GradientPreset, spatial: Spatial
+    s: Any, moves: tuple[Pinhole3, Pinhole3], asked: Counter[str], preset: GradientPreset, spatial: Spatial
 ) -> View:
     """The frame of the first sensor after that of the second, with its pairs along rows and columns."""
     sensor, before = moves
@@ -85,8 +79,3 @@ def paired(
 def whole(view: View) -> View:
     """The same with motion vectors rounded to whole pixels: reuse of points that are up to half a pixel apart."""
     return {name: replace(group, by=np.rint(group.by)) for name, group in view.items()}
-
-
-def frugal(view: View) -> View:
-    """The same with one of the overlapped previous pixels, chosen by its share of the area."""
-    return {name: replace(group, overlap=one_by_area) for name, group in view.items()}

@@ -12,7 +12,7 @@ import numpy as np
 
 from restir_ref.transport.rays import arrive
 from tracer3d import scenes
-from tracer3d.scenes import INSET, Setting
+from tracer3d.scenes import Setting
 from tracer3d.sensors import FILM, Mosaic, Pinhole
 
 SIDE, COUNT = 24, 5
@@ -71,23 +71,16 @@ def approach(setting: Setting, frames: int) -> list[Mosaic]:
     return [_following(setting, last, k - frames + 1) for k in range(frames)]
 
 
-def followed(setting: Setting, side: int, frames: int) -> list[Pinhole]:
-    """A square crop in the middle of the setting's own inset, and what it was while the camera approached."""
-    left, top = (corner + (INSET - side) // 2 for corner in setting.crop)
-    last = Mosaic(setting.pinhole(side, side), ((left, top),))
-    return [_following(setting, last, k - frames + 1).crops()[0] for k in range(frames)]
-
-
 def _following(setting: Setting, last: Mosaic, frame: int) -> Mosaic:
-    now = setting.at(frame).pinhole(last.pinhole.width, last.pinhole.height)
+    now = setting.at(frame).pinhole(SIDE, SIDE)
     return Mosaic(now, tuple(_corner(setting, crop, now) for crop in last.crops()))
 
 
 def _corner(setting: Setting, crop: Pinhole, now: Pinhole) -> tuple[int, int]:
     """Where a crop of another camera begins whose centre sees what this crop's does; it stays on the film."""
-    half = crop.width // 2
+    half = SIDE // 2
     x, w, _ = crop.through(np.array([crop.left + half]), np.array([crop.top + half]))
     v, _, met = arrive(setting.scene, x, w)
     place = now.project(np.where(met, v.x, x + w))[:, 0] + np.array([now.left, now.top])
-    left, top = np.clip(np.rint(place) - half, 0, np.array(FILM) - crop.width)
+    left, top = np.clip(np.rint(place) - half, 0, np.array(FILM) - SIDE)
     return int(left), int(top)

@@ -17,8 +17,8 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import solid
+from figures.experiments.following import followed, frugal, views_of
 from figures.experiments.gradients import ADAPTIVE, METHODS, Method, averaged, spread, temporal_only
-from figures.experiments.pans import frugal, views_in_space
 from figures.experiments.replicas import few, smaller
 from figures.report import style
 from restir_ref.batch import Array
@@ -54,7 +54,7 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     """Averages at equal rays of image and differences, (replicas, n), the L2 and L1 images, and rays per pixel."""
     side, share, asked = preset["side"], SHARES[chunk["method"]], Counter[str]()
     s = SCENES[chunk["scene"]]()
-    views = views_in_space(s, solid.followed(s, side, preset["frames"]), GRADIENT, ADAPTIVE, asked)
+    views = views_of(s, followed(s, side, preset["frames"]), GRADIENT, ADAPTIVE, asked)
     found = ARMS[chunk["method"]]([*map(frugal, views)], asked, share * preset["replicas"], Live(rng))
     mean = {name: averaged(found[name], share) for name in ("primal", "dx", "dy")}
     shapes = {"primal": (side, side), "dx": (side, side - 1), "dy": (side - 1, side)}
