@@ -257,8 +257,33 @@ def motion_vector(mine: Places, steps: int = 4) -> str:
     return right(f"those are the motion vectors; of {m.seen.mean():.0%} of the points the history is their own.")
 
 
+Parts = Callable[[Array], tuple[Array, Array, Array]]
+
+
+def positivized(mine: Parts, count: int = 1000) -> str:
+    """Whether mine(d) says of differences d (3, n) the targets of two reservoirs (n,), and the share of the first."""
+    d = np.random.default_rng(SEED).uniform(-1, 1, (3, count))
+    d[2, : count // 4] = -(d[0] + d[1])[: count // 4]  # whose mean is 0
+    d[:, -1] = 0
+    up, down, share = (np.asarray(each) for each in mine(d))
+    if any(each.shape != (count,) for each in (up, down, share)):
+        raise ValueError(f"return three arrays of shape ({count},), one number for each difference.")
+    if not (np.all(up >= 0) and np.all(down >= 0)):
+        return not_yet("a target must not be negative, nor NaN.")
+    needed = (abs(d) > ROUNDING).any(axis=0)
+    lost = needed & ~((share * (up > 0) + (1 - share) * (down > 0)) > 1 - ROUNDING)
+    if lost.any():
+        return not_yet(
+            f"{lost.sum()} of {count} differences are lost: their part has a target of 0 where it is needed."
+        )
+    return right("every difference is sampled whole, by one reservoir or by both.")
+
+
+ROUNDING = 1e-12
+
+
 CHECKS: Mapping[str, Callable[[Any], str]] = {
     check.__name__: check
-    for check in (ris, gris_pass, weight, all_outcomes, jacobian, careful_shift, film, motion_vector)
+    for check in (ris, gris_pass, weight, all_outcomes, jacobian, careful_shift, film, motion_vector, positivized)
 }
 """All checks by name."""

@@ -83,6 +83,10 @@ WRONG = {
         "columns first": ("row * before.width + column", "column * before.width + row"),
         "beyond the border": ("np.clip(column, 0, before.width - 1)", "column"),
     },
+    "positivized": {
+        "negative": ("np.maximum(d.mean(axis=0), 0) + some", "d.mean(axis=0) + some"),
+        "lost where the mean is 0": ("0.1 * abs(d).mean(axis=0)", "0 * d[0]"),
+    },
 }
 
 
@@ -101,6 +105,7 @@ NO_NUMBERS = {
     "all_outcomes": lambda index, chance: (index % 3, np.nan * index),
     "jacobian": lambda x, y: np.nan * x.r,
     "motion_vector": lambda x, before: np.nan * x[0],
+    "positivized": lambda d: (np.nan * d[0],) * 3,
 }
 
 
