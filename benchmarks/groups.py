@@ -111,11 +111,20 @@ OF_THEORY = {
 SYMMETRIC = "one and the other are treated alike"
 PRINTS = "a number prints alike, whatever its type"
 NAMED_FIRST = "which of two mistakes is named first"
+NOT_BOTH = "without both depths, one alone is apart already, and none is not: nothing exceeds an infinite limit"
 TRANSPORT = {
     "reading._put_scattering: ...np.maximum(lobe, {0 => -1}))": "of ALL lobes, what one does is not used",
     "shifts.shift_path: if {start < stop => True}:": "no columns are no work",
     "shift_identity._means: ...((i <{ => =} j) == up)": "no path is shifted to its own pixel",
     "direction_measure.direction_jacobian: ...{x => y}.c - 1, ...": "only asked where y reconnects where x does",
+    "edges.unlike: ...np.isfinite(t_i){ & np.isfinite(t_j) => })": NOT_BOTH,
+    "edges.unlike: ...np.isfinite({t_i) & np.isfinite( => }t_j))": NOT_BOTH,
+    "edges.unlike: apart = ~met | {both &  => }...": NOT_BOTH,
+    "edges.unlike: apart = ...{np.where(both, t_i, 0) => t_i}...": NOT_BOTH,
+    "edges.unlike: apart = ...{np.where(both, t_j, 0) => t_j}...": NOT_BOTH,
+    "edges.unlike: ...np.where(both, t_i, {0 => ...": NOT_BOTH,
+    "edges.unlike: ...np.where(both, t_j, {0 => ...": NOT_BOTH,
+    "edges.unlike: ...dot(g.n[:, {i], g.n[:, j => j], g.n[:, i}])...": "a product is symmetric",
 }
 FLATLAND2D = {
     "pictures.view: for pixel, u in ...({FILM - 1, 1.0 => 1.0, FILM - 1})):": "a place on the film is pixel + u",
@@ -130,7 +139,18 @@ FLATLAND2D = {
     "scenes: ...{clear_coat, furnace => furnace, clear_coat}...": "scenes are found by name",
     "tone.decoded: ...{np.maximum(t, 0.04045) => t}...": "tones are not negative",
 }
+LOOKED = "how finely is looked whether anything is seen"
 TRACER3D = {
+    "cli._thumbnails: ..._chances({1 => ...": "any seed will do",
+    "meshes._by_trimesh: ...{skip_materials=True,  => }...": "what it is given names no materials",
+    "meshes._by_trimesh: ...skip_materials={True => ...": "what it is given names no materials",
+    "embree.Embree._between: ...{, mode='clip' => }...": "-1 is the last facet as well, and its answer is not used",
+    "embree.Embree._met: ...{, mode='clip' => }...": "-1 is the last facet as well, and its answer is not used",
+    "witness._kinds: ...{int(m) => m}...": "a number is the same key, whatever its type",
+    "sensors.Pinhole.project: to = ...{, dtype=float => }...": "whole numbers subtract alike",
+    "scenes.Setting.__post_init__: check_view(self.scene, self.view({32 => ...": LOOKED,
+    "scenes.Setting.__post_init__: check_view(self.scene, self.view(32, {18 => ...": LOOKED,
+    "render.blank: ...job.setting({0 => ...": "a scene has as many channels in every frame",
     "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
     "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,
     "sensors.Pinhole.project: ...dot({right, to => to, right})...": SYMMETRIC,
@@ -200,7 +220,10 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         ),
         "theory": Group(
             tuple(f"restir_ref/{name}.py" for name in THEORY),
-            ("tests/core/test_*.py", "tests/oracle/test_*.py", "tests/flatland/test_gbuffer.py"),
+            (
+                *("tests/core/test_*.py", "tests/oracle/test_*.py"),
+                *("tests/flatland/test_gbuffer.py", "tests/flatland/test_gradients.py"),
+            ),
             equivalent=OF_THEORY,
         ),
         "oracle": Group(
