@@ -78,8 +78,10 @@ ORACLE = {
     "scenes.random_scene: ...for j in range({ => 1, }count)...": "nothing is below 0",
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }
+TABLE = "motion is a table (film, n)"
 ELIMINATED = "elimination in another order"
 OF_THEORY = {
+    "area.overlapped: by = by[:, index % by.shape[{- => }1]]": TABLE,
     "metrics.neighbour_correlation: ...[..., {:-r], e[..., r: => r:], e[..., :-r}])...": "a correlation is symmetric",
     "decorrelation.bounded: ...all(axis=0), 1.0 => 1.0, inside...": TRUTH,
     "decorrelation.attempt: apart(move.{p_hat, move.p_hat_new => p_hat_new, move.p_hat}...": "apart is symmetric",
@@ -150,6 +152,8 @@ TRACER3D = {
     "sensors.Pinhole.project: to = ...{, dtype=float => }...": "whole numbers subtract alike",
     "scenes.Setting.__post_init__: check_view(self.scene, self.view({32 => ...": LOOKED,
     "scenes.Setting.__post_init__: check_view(self.scene, self.view(32, {18 => ...": LOOKED,
+    "render.Job.hours: ...RAY / {3600 => ...": "an estimate is told in two digits",
+    "methods.reuse_in_tiles: order = tiles(shape{, SIDE => })": "the default",
     "render.blank: ...job.setting({0 => ...": "a scene has as many channels in every frame",
     "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
     "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,

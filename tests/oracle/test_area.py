@@ -211,6 +211,15 @@ def test_what_the_previous_frame_did_not_show_has_no_source() -> None:
     assert only["columns"].tolist() == [NOWHERE, 0, NOWHERE]
 
 
+def test_where_motion_is_known_along_one_axis_only_there_is_no_source() -> None:
+    known = np.zeros((2, 4))
+    for axis in (0, 1):
+        by = known.copy()
+        by[axis, 1] = np.inf
+        (only,) = sources((2, 2), by)
+        assert only["columns"].tolist() == [0, NOWHERE, 2, 3]
+
+
 def test_a_displacement_of_another_number_of_axes_is_refused() -> None:
     with pytest.raises(ValueError, match=r"a film of shape \(3, 4\) has 2 axes, but displacements have 1"):
         overlapped((3, 4), np.zeros((1, 12)), np.arange(12))
@@ -225,6 +234,17 @@ def test_there_and_back_is_the_same_place() -> None:
     assert (y.J > 0).any()
     assert np.array_equal(back.x[y.J > 0], x[y.J > 0])
     assert (y.J * back.J)[y.J > 0] == pytest.approx(1, rel=1e-12)
+
+
+def test_all_of_a_displaced_image_but_its_shifts_is_that_of_the_image() -> None:
+    frame = film_scene(0).now
+    here, index, x = Displaced(frame, BY), np.repeat([0, 1], K), np.tile(np.arange(K), 2)
+    assert here.n == frame.n
+    (own,), (drawn,) = (list(of.candidates(index, Live(np.random.default_rng(1)))) for of in (frame, here))
+    assert np.array_equal(own, drawn)
+    assert np.array_equal(here.target(index, x), frame.target(index, x))
+    assert np.array_equal(here.contribution(index, x), frame.contribution(index, x))
+    assert len(np.unique(frame.contribution(index, x))) > K
 
 
 # ---------------------------------------------------------------- gradient frames

@@ -32,6 +32,16 @@ def test_the_same_command_with_more_frames_goes_on(tmp_path):
     assert first.with_suffix(".pfm").read_bytes() == both.with_suffix(".pfm").read_bytes()
 
 
+def test_frames_that_are_done_are_not_rendered_again(tmp_path, monkeypatch):
+    right, rendered = methods.traced, []
+    monkeypatch.setattr(methods, "traced", lambda *asked: rendered.append(1) or right(*asked))
+    for frames, sofar in ((2, 2), (5, 5), (5, 5), (4, 5)):
+        run("render", "crease", "--method", "path", "--frames", frames, *SMALL, "--out", tmp_path / "a.png")
+        assert len(rendered) == sofar
+    run("render", "crease", "--method", "path", "--frames", 1, "--anew", *SMALL, "--out", tmp_path / "a.png")
+    assert len(rendered) == 6
+
+
 def interrupted_at(monkeypatch, frame: int) -> None:
     """Ctrl-C is pressed while that frame is rendered."""
     right = methods.traced

@@ -191,6 +191,20 @@ def test_if_float64_were_not_asked_more_of_them_would_meet_something_else():
 
 
 @installed
+@pytest.mark.parametrize("size", [2.0**-12, 1.0, 2.0**12])
+def test_walls_beside_the_eye_are_met_and_hide_whatever_the_size_of_the_scene(size):
+    """In a corner, .05 to .5 % of the room from its walls: what is overlooked is a share of the extent, and less."""
+    facets = [replace(each, corners=(size * np.array(each.corners)).tolist()) for each in room(0, emission=grey(1.0))]
+    s, rng = scene(SOLID, [matte(grey(0.5))], facets), np.random.default_rng(5)
+    fast, x, w = with_embree(s), size * rng.uniform(5e-4, 5e-3, (3, 2000)), normalize(-rng.random((3, 2000)))
+    (t, prim), (t_fast, prim_fast) = s.intersect(x, w), fast.intersect(x, w)
+    assert t_fast == pytest.approx(t, rel=1e-9)
+    assert (prim_fast == prim).all()
+    assert fast.visible(x, x + 0.9 * t * w).all()
+    assert not fast.visible(x, x + 1.1 * t * w).any()
+
+
+@installed
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_lamp_flush_in_a_wall_is_met_from_its_front_only(way):
     s = scene(SOLID, [matte(grey(0.5))], [*room(0), *lamp((0.3, 0.3), (0.7, 0.7), 1.0, 8.0)])

@@ -16,6 +16,7 @@ from tracer3d.meshes import Placement, load, placed, with_area
 from tracer3d.scenes import grey, matte
 from tracer3d.shapes import lamp
 from tracer3d.space import SOLID
+from tracer3d.tables import SMALLEST, number
 
 pytest.importorskip("trimesh", reason="needs the extra `mesh`")
 
@@ -126,6 +127,11 @@ X = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]])
 )
 def test_axes_go_where_they_are_sent(at, wanted):
     assert placed(X, at)[0] == pytest.approx(np.array(wanted, dtype=float), abs=1e-12)
+
+
+@pytest.mark.parametrize("x", [0.5 * SMALLEST, SMALLEST, 2 * SMALLEST])
+def test_corners_of_meshes_are_0_where_numbers_of_scene_files_are(x):
+    assert (placed(np.full((1, 3, 3), x), Placement()) == number("").read(x)).all()
 
 
 @pytest.mark.parametrize("scale", [(2, 1, 1), (-2, 1, 1), (1, -1, 3), (-1, -1, -1)])
