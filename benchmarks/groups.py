@@ -81,6 +81,7 @@ ORACLE = {
 TABLE = "motion is a table (film, n)"
 ELIMINATED = "elimination in another order"
 OF_THEORY = {
+    "area.area_temporal: return gris([{canonical, *shared => *shared, canonical}]...": "inputs in another order",
     "area.overlapped: by = by[:, index % by.shape[{- => }1]]": TABLE,
     "metrics.neighbour_correlation: ...[..., {:-r], e[..., r: => r:], e[..., :-r}])...": "a correlation is symmetric",
     "decorrelation.bounded: ...all(axis=0), 1.0 => 1.0, inside...": TRUTH,
@@ -174,7 +175,9 @@ AUDIT = {
     "mistakes.at_s: ...[{0 => -1}])": "the first of one row is the last",
     "mistakes.inputs_counted: ...len(p.{W => c})...": "as many confidences as weights",
 }
+NULL = "whichever cell a sample of weight 0 is in"
 ZOO = {
+    "probe.bounds: ...own(stage, i, {0 => ...": NULL,
     "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
         "the edges of a null column are 0, which start bounds from below"
     ),

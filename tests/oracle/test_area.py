@@ -434,6 +434,16 @@ def test_overlapped_pixels_bring_their_shares_of_a_capped_confidence() -> None:
     assert edge["primal"].c.tolist() == [2.5, 2.5]  # a quarter of either square lies outside of the row
 
 
+@pytest.mark.claims("GPT-A05", part="confidences of the overlapped pixels")
+@pytest.mark.parametrize(("by", "found"), [(BY, 3.0), (BY / 2, 3.0), (-BY / 2, 2.5)])
+def test_area_reservoirs_have_the_confidence_of_the_area_that_the_previous_frame_showed(by, found) -> None:
+    before, now = film_scene(1).frames
+    index, chance = np.arange(2), Live(np.random.default_rng(1))
+    X, Y = (replace(initial(Pixels(of, index), chance), c=c) for of, c in ((now, ONE), (before, 9 * ONE)))
+    shown = [(Pixels(still(before, by), columns), share) for columns, share in overlapped((2,), by, index)]
+    assert area_temporal(X, Pixels(Displaced(now, by), index), Y, shown, chance, cap=2.0).c.tolist() == [found] * 2
+
+
 ONE = np.ones(2)
 
 
