@@ -46,7 +46,8 @@ KERNEL = {
     "resampling._check_input: for ...source.X.c), ('weight W', source.X.W})):": "which of two mistakes is named first",
 }
 
-SHORT_TABLE = "the last axis of a table is its axis 1"
+SHORT_AS_MANY = "as many confidences as weights"
+TABLE = "the last axis of a table is its axis 1"
 TRUTH = "True counts as 1"
 TAIL = "where the range of t ends, beyond which 1e-17 is left"
 HEAD = "where the range of t begins, before which 1e-17 is left"
@@ -82,6 +83,15 @@ TABLE = "motion is a table (film, n)"
 ELIMINATED = "elimination in another order"
 OF_THEORY = {
     "area.area_temporal: return gris([{canonical, *shared => *shared, canonical}]...": "inputs in another order",
+    "gradient_loop: Partners = ...": "a type",
+    "gradient_loop: View = ...": "a type",
+    "gradient_loop: Parts = ...": "a type",
+    "gradient_loop: History = ...": "a type",
+    "gradient_loop.columns_of: ...{W => c})": AS_MANY,
+    "gradient_loop.replaced: order[columns] = len(X.{W => c})...": AS_MANY,
+    "gradient_loop.replaced: order = np.arange(len(X.{W => c}))": AS_MANY,
+    "gradient_loop.Group.__post_init__: ...{int(np.prod(self.shape) => np.prod(self.shape}):": "a whole number either way",
+    "gradient_loop.in_space: ...[{here, *near => *near, here}]": "inputs in another order",
     "area.overlapped: by = by[:, index % by.shape[{- => }1]]": TABLE,
     "metrics.neighbour_correlation: ...[..., {:-r], e[..., r: => r:], e[..., :-r}])...": "a correlation is symmetric",
     "decorrelation.bounded: ...all(axis=0), 1.0 => 1.0, inside...": TRUTH,
@@ -173,7 +183,7 @@ AUDIT = {
     "compare.Check.worst: columns = int(self.wrong.reshape(-{1 => 2}...": "any negative number will do",
     "load._check_values: for name in ('{u', 'u_stream => u_stream', 'u}'):": "which of two mistakes is named first",
     "mistakes.at_s: ...[{0 => -1}])": "the first of one row is the last",
-    "mistakes.inputs_counted: ...len(p.{W => c})...": "as many confidences as weights",
+    "mistakes.inputs_counted: ...len(p.{W => c})...": AS_MANY,
 }
 NULL = "whichever cell a sample of weight 0 is in"
 ZOO = {

@@ -8,11 +8,10 @@ import pytest
 from restir_ref.area import Displaced, area_temporal, one_by_area, overlapped, still
 from restir_ref.batch import Array
 from restir_ref.chance import Live
-from restir_ref.gradient import SIGNS, Pairs
+from restir_ref.gradient import SIGNS
 from restir_ref.gradient_loop import (
     ACROSS_SIGNS,
     GRADIENT,
-    PARTS,
     SAME_SIGN,
     UNSIGNED,
     GradientPreset,
@@ -22,6 +21,7 @@ from restir_ref.gradient_loop import (
     in_space,
     in_time,
     nearer,
+    pairs_of,
     sampled,
     shaded,
     step,
@@ -262,7 +262,7 @@ def group(of: dict, by: Array = BY) -> Group:
 
 
 def pair_group(frame: Frame, *parts: str) -> Group:
-    return group({part: Pairs(frame, RING, PARTS[part]) for part in parts})
+    return group(pairs_of(frame, RING, dict.fromkeys(parts, parts)))
 
 
 def pair_frames(scene: Scene, *parts: str, partners=SAME_SIGN):
@@ -397,13 +397,16 @@ def test_history_of_another_size_is_refused() -> None:
         in_time(group({"primal": small}), X, (there, X), PRESET.pixels, {"primal": ("primal",)}, Live(None))
 
 
-def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one() -> None:
-    found = forward((2, 3))
-    (dx, shape_x), (dy, shape_y) = found["dx"], found["dy"]
-    assert (shape_x, shape_y) == ((2, 2), (1, 3))
-    image = np.arange(6.0).reshape(2, 3) ** 2
+@pytest.mark.parametrize("shape", [(2, 3), (3, 2), (4, 5), (1, 4)])
+def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one(shape) -> None:
+    (dx, shape_x), (dy, shape_y) = forward(shape).values()
+    assert [*forward(shape)] == ["dx", "dy"]
+    image = np.arange(np.prod(shape)).reshape(shape) ** 2
     assert np.array_equal(np.subtract(*image.ravel()[dx]).reshape(shape_x), np.diff(image, axis=1))
     assert np.array_equal(np.subtract(*image.ravel()[dy]).reshape(shape_y), np.diff(image, axis=0))
+
+
+def test_pairs_of_rows_and_of_several_crops_stay_inside_of_each() -> None:
     assert forward((4,))["dx"][0].tolist() == [[1, 2, 3], [0, 1, 2]]
     assert forward((2,), crops=2)["dx"][0].tolist() == [[1, 3], [0, 2]]
 
