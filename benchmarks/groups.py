@@ -46,8 +46,7 @@ KERNEL = {
     "resampling._check_input: for ...source.X.c), ('weight W', source.X.W})):": "which of two mistakes is named first",
 }
 
-SHORT_AS_MANY = "as many confidences as weights"
-TABLE = "the last axis of a table is its axis 1"
+SHORT_TABLE = "the last axis of a table is its axis 1"
 TRUTH = "True counts as 1"
 TAIL = "where the range of t ends, beyond which 1e-17 is left"
 HEAD = "where the range of t begins, before which 1e-17 is left"
@@ -79,6 +78,8 @@ ORACLE = {
     "scenes.random_scene: ...for j in range({ => 1, }count)...": "nothing is below 0",
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }
+WHOLE = "a whole number either way"
+AS_MANY = "as many confidences as weights"
 TABLE = "motion is a table (film, n)"
 ELIMINATED = "elimination in another order"
 OF_THEORY = {
@@ -90,7 +91,8 @@ OF_THEORY = {
     "gradient_loop.columns_of: ...{W => c})": AS_MANY,
     "gradient_loop.replaced: order[columns] = len(X.{W => c})...": AS_MANY,
     "gradient_loop.replaced: order = np.arange(len(X.{W => c}))": AS_MANY,
-    "gradient_loop.Group.__post_init__: ...{int(np.prod(self.shape) => np.prod(self.shape}):": "a whole number either way",
+    "gradient_loop.Group.__post_init__: ...{int(np.prod(self.shape) => np.prod(self.shape}):": WHOLE,
+    "gradient_loop.forward: ...{int(np.prod(shape) => np.prod(shape})...": WHOLE,
     "gradient_loop.in_space: ...[{here, *near => *near, here}]": "inputs in another order",
     "area.overlapped: by = by[:, index % by.shape[{- => }1]]": TABLE,
     "metrics.neighbour_correlation: ...[..., {:-r], e[..., r: => r:], e[..., :-r}])...": "a correlation is symmetric",

@@ -20,6 +20,7 @@ from restir_ref.gradient_loop import (
     History,
     Partners,
     View,
+    in_space,
     in_time,
     pairs_of,
     step,
@@ -93,6 +94,16 @@ def test_a_step_has_one_replica_unless_told_otherwise() -> None:
     preset = unequal(1)
     found = step(two_groups(SAME_SIGN), Live(np.random.default_rng(1)), preset)
     assert {len(X.W) for parts in found.values() for X in parts.values()} == {N}
+
+
+def test_reuse_in_space_changes_none_of_the_reservoirs_it_reads() -> None:
+    """Else the second sign would read what the first one has become."""
+    view, chance, preset = two_groups(ACROSS_SIGNS), Live(np.random.default_rng(1)), unequal(0, ACROSS_SIGNS)
+    read = step(view, chance, replace(preset, pairs=replace(preset.pairs, rounds=0)))["ring"]
+    before = dict(read)
+    found = in_space(view["ring"], read, preset.pairs, ACROSS_SIGNS, chance)
+    assert all(read[part] is X for part, X in before.items())
+    assert not any(found[part] is X for part, X in before.items())
 
 
 # ---------------------------------------------------------------- history of the same places

@@ -1,4 +1,4 @@
-"""What the witness is told of a scene: each glass its own index, lamps by their power, and all of it around the origin."""
+"""What the witness is told of a scene: each glass its own index, lamps by power, all of it around the origin."""
 
 from itertools import permutations
 
