@@ -110,6 +110,8 @@ OF_THEORY = {
     "poisson.ends: ...swapaxes(-1{, -1 - k =>  - k, -1})...": "swapping is symmetric",
     "poisson.by_transform.solve: ...{, overwrite_x=True => }))": "the same numbers, in more memory",
     "poisson.by_transform.solve: ...overwrite_x={True => False}))": "the same numbers, in more memory",
+    "poisson._along: factors[-1 {- => +} k] = ...": "an image has two axes at most, and -2 is the same as 0",
+    "poisson.checked: ...np.asarray(g{, dtype=float => })...": "gradients meet the image, which has 64 bits",
     "poisson.by_elimination: ...{permc_spec='MMD_AT_PLUS_A',  => }...": ELIMINATED,
     "poisson.by_elimination: ...{diag_pivot_thresh=0.0,  => }...": ELIMINATED,
     "poisson.by_elimination: ...{, options={'SymmetricMode': True} => })": ELIMINATED,
@@ -119,6 +121,11 @@ OF_THEORY = {
     "poisson.symbol: ...sparse=True => }...": "the same numbers, in more memory",
     "poisson.symbol: ...sparse={True => False}...": "the same numbers, in more memory",
     "poisson.checked: _forward({g, own => own, g}, name)": "a product is symmetric",
+    "poisson_l1: ROUNDS, COOLING = ({60 => ...": "by then no more steps are taken",
+    "poisson_l1.l1_norm: ...{alpha * to_primal, *to_gradients => *to_gradients, alpha * to_primal}...": (
+        "a sum in another order"
+    ),
+    "poisson_l1.scale: ...np.where(mean > 0, mean, {1 => ...": "where all fits, residuals are 0 in any scale",
     "poisson_l1.normal_equations...{w_g, steps => steps, w_g}...": "a product is symmetric",
     "poisson_l1.normal_equations: ...{w_g, gradients => gradients, w_g}...": "a product is symmetric",
     "poisson_l1.conjugate_gradients: ...dot({r, z => z, r})...": "a product is symmetric",
@@ -189,6 +196,7 @@ AUDIT = {
 }
 NULL = "whichever cell a sample of weight 0 is in"
 ZOO = {
+    "checks.worst_mean: ...sum(axis={- => }1)...": SHORT_TABLE,
     "probe.bounds: ...own(stage, i, {0 => ...": NULL,
     "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
         "the edges of a null column are 0, which start bounds from below"

@@ -1,0 +1,48 @@
+"""Parts that bugs of the zoo are made of, by themselves: right ones are right on scenes of any size."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from restir_ref.batch import Array
+from restir_ref.oracle.scenes import reference_scene, three_pixel_scene, two_technique_scene
+from restir_ref.oracle.zoo.mutations import Clamping, Stepping
+
+SCENES = {scene.__name__: scene for scene in (reference_scene, three_pixel_scene, two_technique_scene)}
+every_scene = pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+
+
+@dataclass(frozen=True)
+class Always:
+    """Chance that always takes the same option."""
+
+    option: int
+
+    def choose(self, weights: Array) -> Array:
+        return np.full(weights.shape[1], self.option)
+
+
+def forth_and_back(kind, scene, option: int) -> tuple[Array, Array, Array]:
+    """All cells of all pixels, where a step and the opposite one lead from each, and the product of both ratios T."""
+    now = scene().made_of(kind).now
+    K = now.cells.v.shape[-1]
+    index, x = np.repeat(np.arange(now.n), K), np.tile(np.arange(K), now.n)
+    y, T = now.propose(index, x, Always(option))
+    back, T_back = now.propose(index, y, Always(1 - option))
+    assert ((y >= 0) & (y < K)).all()
+    return x, back, T * T_back
+
+
+@every_scene
+@pytest.mark.parametrize("option", [0, 1])
+def test_a_step_is_undone_by_the_opposite_one_and_so_is_its_density(scene, option) -> None:
+    x, back, T = forth_and_back(Stepping, scene, option)
+    assert np.array_equal(back, x)
+    assert pytest.approx(1, rel=1e-12) == T
+
+
+@every_scene
+def test_a_clamped_step_is_not(scene) -> None:
+    x, back, _ = forth_and_back(Clamping, scene, 0)
+    assert (back != x).any()
