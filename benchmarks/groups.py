@@ -122,6 +122,9 @@ OF_THEORY = {
     "poisson.symbol: ...sparse={True => False}...": "the same numbers, in more memory",
     "poisson.checked: _forward({g, own => own, g}, name)": "a product is symmetric",
     "poisson_l1: ROUNDS, COOLING = ({60 => ...": "by then no more steps are taken",
+    "poisson_l1.l1: ...scale([{alpha * to_primal, *to_gradients => *to_gradients, alpha * to_primal}]...": (
+        "a sum in another order"
+    ),
     "poisson_l1.l1_norm: ...{alpha * to_primal, *to_gradients => *to_gradients, alpha * to_primal}...": (
         "a sum in another order"
     ),
@@ -174,6 +177,7 @@ TRACER3D = {
     "scenes.Setting.__post_init__: check_view(self.scene, self.view(32, {18 => ...": LOOKED,
     "render.Job.hours: ...RAY / {3600 => ...": "an estimate is told in two digits",
     "methods.reuse_in_tiles: order = tiles(shape{, SIDE => })": "the default",
+    "cli._picture_options: camera.add_argument('--still', ...dest='moving',  => }...": "the default is not set again",
     "render.blank: ...job.setting({0 => ...": "a scene has as many channels in every frame",
     "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
     "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,

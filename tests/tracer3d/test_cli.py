@@ -148,6 +148,21 @@ def test_words_that_are_no_numbers_are_refused(capsys, words, said):
     assert said in capsys.readouterr().err
 
 
+NUMBERS = {
+    "render": {"frames": "3", "depth": "3", "seed": "3"},
+    "compare": {"trees": "3", "rays": "2.5", "seconds": "0.5", "depth": "3", "seed": "3"},
+}
+
+
+@pytest.mark.parametrize(("command", "option"), [(c, option) for c, options in NUMBERS.items() for option in options])
+def test_every_number_is_read_as_one_and_words_instead_of_it_are_refused(capsys, command, option):
+    word = NUMBERS[command][option]
+    assert getattr(cli.parser().parse_args([command, "crease", f"--{option}", word]), option) == float(word)
+    with pytest.raises(SystemExit, match="2"):
+        cli.parser().parse_args([command, "crease", f"--{option}", "many"])
+    assert "'many' is not a" in capsys.readouterr().err
+
+
 def test_a_reference_of_another_size_and_a_comparison_without_budget_are_refused(tmp_path, capsys):
     files.write_pfm(tmp_path / "r.pfm", np.ones((3, 4, 6)))
     assert run("render", "crease", *SMALL, "--reference", tmp_path / "r.pfm", "--out", tmp_path / "a.png") == 2

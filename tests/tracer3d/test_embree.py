@@ -99,10 +99,10 @@ def test_restir_pt_by_embree_has_the_pixels_of_brute_force():
 # ---------------------------------------------------------------- edges, ends, and what lies in one place
 
 
-def past_an_edge(n: int = 4000) -> tuple[Array, Array]:
-    """Ends of segments that pass the door's edge (x = 1, z = .56) of Ajar3 within 1e-6, (3, n) each."""
+def past_an_edge(n: int = 4000, within: float = 1e-6) -> tuple[Array, Array]:
+    """Ends of segments that pass the door's edge (x = 1, z = .56) of Ajar3 so near, (3, n) each."""
     rng = np.random.default_rng(2)
-    edge = np.stack([np.ones(n), rng.uniform(0.1, 0.8, n), 0.56 + rng.uniform(-1e-6, 1e-6, n)])
+    edge = np.stack([np.ones(n), rng.uniform(0.1, 0.8, n), 0.56 + rng.uniform(-within, within, n)])
     x = np.stack([rng.uniform(0.1, 0.9, n), rng.uniform(0.1, 0.9, n), rng.uniform(0.1, 0.9, n)])
     return x, edge + rng.uniform(0.2, 0.8, n) * (edge - x)
 
@@ -116,6 +116,17 @@ def one_sided(s: Scene) -> int:
 @installed
 def test_visibility_is_the_same_from_both_ends():
     assert one_sided(both("ajar")[1]) == 0
+
+
+@installed
+def test_what_passes_an_edge_nearer_than_float32_can_tell_is_never_hidden_where_brute_force_sees():
+    """What float32 meets is judged in float64; what it misses, beyond the edge or not, is not met."""
+    plain, fast = both("ajar")
+    x, y = past_an_edge(within=1e-8)
+    clear = plain.visible(x, y)
+    assert 0.3 < clear.mean() < 0.7
+    assert fast.visible(x, y)[clear].all()
+    assert not fast.visible(x, y).all()
 
 
 @installed
@@ -202,6 +213,19 @@ def test_walls_beside_the_eye_are_met_and_hide_whatever_the_size_of_the_scene(si
     assert (prim_fast == prim).all()
     assert fast.visible(x, x + 0.9 * t * w).all()
     assert not fast.visible(x, x + 1.1 * t * w).any()
+
+
+@installed
+def test_rays_along_the_wall_that_they_leave_meet_what_brute_force_meets():
+    """They never rise above it, in float32 or in float64."""
+    plain, fast = both("matte_cornell")
+    rng = np.random.default_rng(6)
+    x, w = rng.uniform(0.01, 0.99, (2, 3, 500))
+    x[1], w = 0.0, normalize((w - 0.5) * np.array([[1.0], [0.0], [1.0]]))
+    t, prim = fast.intersect(x, w)
+    assert t == pytest.approx(plain.intersect(x, w)[0], rel=1e-9)
+    assert (prim == plain.intersect(x, w)[1]).all()
+    assert (fast.visible(x, x + 0.5 * w) == plain.visible(x, x + 0.5 * w)).all()
 
 
 @installed

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from restir_ref.batch import Array
 from restir_ref.transport.scene import Facet, scene
 from tracer3d import meshes
-from tracer3d.meshes import Placement, load, placed, with_area
+from tracer3d.meshes import FLAT, SPECK, Placement, load, placed, with_area
 from tracer3d.scenes import grey, matte
 from tracer3d.shapes import lamp
 from tracer3d.space import SOLID
@@ -127,6 +127,19 @@ X = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]])
 )
 def test_axes_go_where_they_are_sent(at, wanted):
     assert placed(X, at)[0] == pytest.approx(np.array(wanted, dtype=float), abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e6])
+def test_whether_a_triangle_has_area_goes_by_its_shape_and_not_by_its_size_down_to_a_speck(size):
+    height = size * np.array([2 * FLAT, 0.5 * FLAT, 1.0])
+    base = np.array([[0.0, 0, 0], [size, 0, 0], [0, 0, 0]])
+    thin = [base + [[0, 0, 0], [0, 0, 0], [0, h, 0]] for h in height]
+    assert with_area(np.array(thin)).tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize(("side", "found"), [(2 * SPECK, True), (0.5 * SPECK, False)])
+def test_what_is_smaller_than_a_speck_has_no_area(side, found):
+    assert with_area(side * np.array([[[0.0, 0, 0], [1, 0, 0], [0, 0, 0.7]]])).tolist() == [found]
 
 
 @pytest.mark.parametrize("x", [0.5 * SMALLEST, SMALLEST, 2 * SMALLEST])

@@ -407,3 +407,12 @@ def test_no_value_of_any_key_ends_in_a_traceback(tmp_path, at, value):
 def test_brackets_in_brackets_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"my.toml is no TOML"):
         read(written(tmp_path, "a = " + 5000 * "["))
+
+
+@pytest.mark.parametrize("kind", ["COLOUR", "EMISSION", "SCALE"])
+def test_one_number_stands_for_three_equal_ones(kind):
+    read = getattr(scene_keys, kind).read
+    for x in (0.25, 1):
+        assert read(x) == read([x, x, x]) == (x, x, x)
+    with pytest.raises((TypeError, ValueError)):
+        read([0.25, 0.25])
