@@ -122,6 +122,7 @@ OF_THEORY = {
     "poisson.symbol: ...sparse={True => False}...": "the same numbers, in more memory",
     "poisson.checked: _forward({g, own => own, g}, name)": "a product is symmetric",
     "poisson_l1: ROUNDS, COOLING = ({60 => ...": "by then no more steps are taken",
+    "poisson_l1.normal_equations.product: ...{v => primal}.shape))": "both are of one shape",
     "poisson_l1.l1: ...scale([{alpha * to_primal, *to_gradients => *to_gradients, alpha * to_primal}]...": (
         "a sum in another order"
     ),

@@ -132,8 +132,7 @@ def test_axes_go_where_they_are_sent(at, wanted):
 @pytest.mark.parametrize("size", [1e-12, 1.0, 1e6])
 def test_whether_a_triangle_has_area_goes_by_its_shape_and_not_by_its_size_down_to_a_speck(size):
     height = size * np.array([2 * FLAT, 0.5 * FLAT, 1.0])
-    base = np.array([[0.0, 0, 0], [size, 0, 0], [0, 0, 0]])
-    thin = [base + [[0, 0, 0], [0, 0, 0], [0, h, 0]] for h in height]
+    thin = [[[0.0, 0, 0], [size, 0, 0], [0, h, 0]] for h in height]
     assert with_area(np.array(thin)).tolist() == [True, False, True]
 
 

@@ -92,3 +92,8 @@ def test_microfacets_at_the_ends_of_the_disk_come_back_though_they_stick_out_by_
     m = SOLID.visible(u, v)
     assert ((m * m).sum(axis=0) > 1).any()
     assert SOLID.unvisible(m, v) == pytest.approx(u, abs=1e-6)
+
+
+def test_the_middle_of_the_square_is_the_middle_of_the_disk():
+    assert (SOLID.ball(np.full((2, 1), 0.5)) == 0).all()
+    assert SOLID.unball(np.zeros((2, 1))) == pytest.approx(0.5, abs=1e-12)
