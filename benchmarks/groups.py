@@ -179,6 +179,11 @@ TRACER3D = {
     "render.Job.hours: ...RAY / {3600 => ...": "an estimate is told in two digits",
     "methods.reuse_in_tiles: order = tiles(shape{, SIDE => })": "the default",
     "cli._picture_options: camera.add_argument('--still', ...dest='moving',  => }...": "the default is not set again",
+    "cli._path_traced: ...{desc='reference',  => }...": "words of a bar",
+    "compare.sheet: figure.savefig(path, dpi={150 => ...": "how finely it is drawn",
+    "cli._path_traced: ..._chances(job.seed + {1 => 2}...": "any seed but that of what it is held against",
+    "shapes.quad: a, b, c, d = np.asarray(corners{, dtype=float => })": "whole numbers subtract alike",
+    "embree.Embree._first: if not { => not }len(left):": "what is left is asked of all facets, more slowly",
     "render.blank: ...job.setting({0 => ...": "a scene has as many channels in every frame",
     "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
     "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,
@@ -202,6 +207,7 @@ AUDIT = {
 NULL = "whichever cell a sample of weight 0 is in"
 ZOO = {
     "checks.worst_mean: ...sum(axis={- => }1)...": SHORT_TABLE,
+    "selection: ...{of the selected sample times J...": "bugs are found by name",
     "probe.bounds: ...own(stage, i, {0 => ...": NULL,
     "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
         "the edges of a null column are 0, which start bounds from below"

@@ -7,7 +7,9 @@ import pytest
 
 from restir_ref.batch import Array
 from restir_ref.oracle.scenes import reference_scene, three_pixel_scene, two_technique_scene
+from restir_ref.oracle.zoo.checks import statistics
 from restir_ref.oracle.zoo.mutations import Clamping, Stepping
+from restir_ref.oracle.zoo.selection import SELECTION_BUGS
 
 SCENES = {scene.__name__: scene for scene in (reference_scene, three_pixel_scene, two_technique_scene)}
 every_scene = pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
@@ -46,3 +48,12 @@ def test_a_step_is_undone_by_the_opposite_one_and_so_is_its_density(scene, optio
 def test_a_clamped_step_is_not(scene) -> None:
     x, back, _ = forth_and_back(Clamping, scene, 0)
     assert (back != x).any()
+
+
+@pytest.mark.parametrize("bug", [bug for bug in SELECTION_BUGS if bug.scene is reference_scene], ids=lambda b: b.name)
+def test_what_is_wrongly_selected_or_weighed_has_no_weight_where_there_is_no_light(bug) -> None:
+    scene = bug.scene()
+    found, right = (statistics(parts(scene), scene).first for parts in (bug.wrong, bug.right))
+    assert (~scene.support).any()
+    assert not found[~scene.support].any()
+    assert not right[~scene.support].any()

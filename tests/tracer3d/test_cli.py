@@ -8,6 +8,7 @@ from matplotlib.image import imread
 
 from tracer3d import cli, compare, files, methods
 from tracer3d.methods import METHODS
+from tracer3d.render import Job, blank, render
 from tracer3d.scenes import SCENES
 
 SMALL = ["--size", "8x8", "--crop", "--depth", "2"]
@@ -222,3 +223,11 @@ def test_a_table_tells_the_errors_of_every_method():
     assert [float(each) for each in lines[1].split()[4:]] == [0, 0, 0]
     assert all(float(each) > 0 for each in lines[2].split()[4:])
     assert len(lines[2].split()) == 7
+
+
+def test_our_own_reference_shares_no_random_numbers_with_what_is_held_against_it():
+    job = Job("crease", "path", size=(8, 8), depth=2)
+    *_, same = render(job, cli._chances(job.seed), 2, blank(job), job.compiled())
+    *_, again = render(job, cli._chances(job.seed), 2, blank(job), job.compiled())
+    assert np.array_equal(same.mean, again.mean)
+    assert (cli._path_traced(job, 2) == same.mean).mean() < 0.1

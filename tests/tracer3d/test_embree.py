@@ -216,6 +216,18 @@ def test_walls_beside_the_eye_are_met_and_hide_whatever_the_size_of_the_scene(si
 
 
 @installed
+def test_what_stands_a_millionth_of_the_extent_away_is_not_overlooked():
+    """START is half of that."""
+    s, rng, h = scene(SOLID, [matte(grey(0.5))], room(0, emission=grey(1.0))), np.random.default_rng(8), 0.9 * 2.0**-20
+    fast, axis, far = with_embree(s), np.repeat(np.arange(3), 200), np.tile([0, 1], 300)
+    x, w, column = rng.uniform(0.1, 0.9, (3, 600)), np.zeros((3, 600)), np.arange(600)
+    x[axis, column], w[axis, column] = np.where(far, 1 - h, h), np.where(far, 1.0, -1.0)
+    assert s.extent == 1
+    assert fast.intersect(x, w)[0] == pytest.approx(h, rel=1e-6)
+    assert not fast.visible(x, x + 0.5 * w).any()
+
+
+@installed
 def test_rays_along_the_wall_that_they_leave_meet_what_brute_force_meets():
     """They never rise above it, in float32 or in float64."""
     plain, fast = both("matte_cornell")

@@ -53,6 +53,7 @@ CUBES = {
     "commented": (".obj", b"mtllib x.mtl\n" + obj().replace(b"\n", b" # a remark\n")),
     "coloured": (".obj", obj().replace(b"\nf", b" 1 0.5 0\nf", 1)),
     "continued": (".obj", obj().replace(b"f 1 2", b"f 1 \\\n2")),
+    "faces first": (".obj", b"\n".join(sorted(obj().split(b"\n"), key=lambda row: row[:1]))),
     "ply": (".ply", ply()),
     "little-endian ply": (".ply", binary("<")),
     "big-endian ply": (".ply", binary(">")),

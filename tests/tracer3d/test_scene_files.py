@@ -416,3 +416,11 @@ def test_one_number_stands_for_three_equal_ones(kind):
         assert read(x) == read([x, x, x]) == (x, x, x)
     with pytest.raises((TypeError, ValueError)):
         read([0.25, 0.25])
+
+
+@needs_trimesh
+def test_a_mesh_of_too_many_triangles_is_refused_before_one_of_them_is_placed(tmp_path, monkeypatch):
+    monkeypatch.setattr(scene_files, "MOST", 3)
+    monkeypatch.setattr(scene_files.meshes, "placed", lambda *_: pytest.fail("placed"))
+    with pytest.raises(ValueError, match="4 triangles, more than 3"):
+        read(written(tmp_path, ROOM + MESH))
