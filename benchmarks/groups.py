@@ -184,6 +184,8 @@ TRACER3D = {
     "cli._path_traced: ..._chances(job.seed + {1 => 2}...": "any seed but that of what it is held against",
     "shapes.quad: a, b, c, d = np.asarray(corners{, dtype=float => })": "whole numbers subtract alike",
     "embree.Embree._first: if not { => not }len(left):": "what is left is asked of all facets, more slowly",
+    "sensors.Pinhole.through: ...np.ones(len({column => row}))": "as many columns as rows",
+    "files.tone: ...{np.maximum(v, 0.0031308) => v}...": "tones are not negative",
     "render.blank: ...job.setting({0 => ...": "a scene has as many channels in every frame",
     "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
     "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,

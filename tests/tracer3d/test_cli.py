@@ -223,6 +223,8 @@ def test_a_table_tells_the_errors_of_every_method():
     assert [float(each) for each in lines[1].split()[4:]] == [0, 0, 0]
     assert all(float(each) > 0 for each in lines[2].split()[4:])
     assert len(lines[2].split()) == 7
+    R = rows[0].picture.mean[0]
+    assert float(lines[2].split()[4]) == pytest.approx((0.1 * R / (0.01 * R.mean() + R)).mean(), abs=1e-4)
 
 
 def test_our_own_reference_shares_no_random_numbers_with_what_is_held_against_it():
