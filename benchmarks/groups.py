@@ -186,6 +186,8 @@ TRACER3D = {
     "embree.Embree._first: if not { => not }len(left):": "what is left is asked of all facets, more slowly",
     "sensors.Pinhole.through: ...np.ones(len({column => row}))": "as many columns as rows",
     "files.tone: ...{np.maximum(v, 0.0031308) => v}...": "tones are not negative",
+    "witness._groups: return {list(dict.fromkeys(...": "the same kinds in the same order",
+    "embree.Embree.visible: ...visible({x.take(doubt, axis=-1), y => y.take(doubt, axis=-1), x}...": SYMMETRIC,
     "render.blank: ...job.setting({0 => ...": "a scene has as many channels in every frame",
     "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
     "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,
@@ -206,10 +208,13 @@ AUDIT = {
     "mistakes.at_s: ...[{0 => -1}])": "the first of one row is the last",
     "mistakes.inputs_counted: ...len(p.{W => c})...": AS_MANY,
 }
+NOT_SELECTED = "the pass that follows selects no sample without light"
 NULL = "whichever cell a sample of weight 0 is in"
 ZOO = {
     "checks.worst_mean: ...sum(axis={- => }1)...": SHORT_TABLE,
     "selection: ...{of the selected sample times J...": "bugs are found by name",
+    "selection.density_of_chosen: ...np.where(X.W >{ => =} 0, ...": NOT_SELECTED,
+    "selection.density_of_chosen: ...np.where(X.W > 0, X.x.number, {0 => ...": NOT_SELECTED,
     "probe.bounds: ...own(stage, i, {0 => ...": NULL,
     "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
         "the edges of a null column are 0, which start bounds from below"

@@ -1,15 +1,20 @@
 """Parts that bugs of the zoo are made of, by themselves: right ones are right on scenes of any size."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from restir_ref.batch import Array
+from restir_ref.chance import Live
+from restir_ref.integrals import Pixels
+from restir_ref.mis import WEIGHTS
 from restir_ref.oracle.scenes import random_scene, reference_scene, three_pixel_scene, two_technique_scene
 from restir_ref.oracle.zoo.checks import statistics
+from restir_ref.oracle.zoo.inefficient import capped_after
 from restir_ref.oracle.zoo.mutations import Clamping, Stepping
 from restir_ref.oracle.zoo.selection import SELECTION_BUGS
+from restir_ref.restir import initial, temporal
 
 SCENES = {scene.__name__: scene for scene in (reference_scene, three_pixel_scene, two_technique_scene)}
 every_scene = pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
@@ -61,3 +66,13 @@ def test_what_is_wrongly_selected_or_weighed_has_no_weight_where_there_is_no_lig
     scene = next(each for each in scenes if dark(each).any())
     for parts in (bug.wrong, bug.right):
         assert not statistics(parts(scene), scene).first[dark(scene)].any()
+
+
+@pytest.mark.parametrize("cap", [2.0, 5.0])
+def test_a_cap_after_the_merge_bounds_the_result_and_a_cap_before_it_the_history(cap) -> None:
+    before, now = reference_scene().frames
+    index, chance = np.arange(before.n), Live(np.random.default_rng(1))
+    X, Y = (initial(Pixels(of, index), chance) for of in (now, before))
+    old, sources = replace(Y, c=9 * Y.c), [Pixels(before, index)]
+    for merge, found in ((capped_after, cap), (temporal, 1 + cap)):
+        assert (merge(X, Pixels(now, index), old, sources, chance, mis=WEIGHTS["talbot"], cap=cap).c == found).all()
