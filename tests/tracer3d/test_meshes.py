@@ -218,6 +218,7 @@ DAMAGE = {
     ),
     "binary cut off": (".ply", binary("<")[:-5], "trimesh cannot read it (ValueError: PLY is unexpected length!)"),
     "a binary index out of range": (".ply", binary("<")[:-4] + b"\x09\0\0\0", "6 faces 12 triangles can be read, with"),
+    "a binary index of no vertex": (".ply", binary("<")[:-4] + b"\xff\xff\xff\xff", "with corners -1 .. 7 of 8"),
     "another format": (".stl", "solid", "there is no mesh format '.stl': there are .obj, .ply"),
 }
 
