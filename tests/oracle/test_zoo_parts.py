@@ -8,12 +8,13 @@ import pytest
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels
-from restir_ref.mis import WEIGHTS
+from restir_ref.mis import WEIGHTS, Confidences, pairwise
 from restir_ref.oracle.scenes import random_scene, reference_scene, three_pixel_scene, two_technique_scene
 from restir_ref.oracle.zoo.checks import statistics
 from restir_ref.oracle.zoo.inefficient import capped_after
 from restir_ref.oracle.zoo.mutations import Clamping, Stepping
 from restir_ref.oracle.zoo.selection import SELECTION_BUGS
+from restir_ref.oracle.zoo.weights import swapped_pairwise
 from restir_ref.restir import initial, temporal
 
 SCENES = {scene.__name__: scene for scene in (reference_scene, three_pixel_scene, two_technique_scene)}
@@ -76,3 +77,22 @@ def test_a_cap_after_the_merge_bounds_the_result_and_a_cap_before_it_the_history
     old, sources = replace(Y, c=9 * Y.c), [Pixels(before, index)]
     for merge, found in ((capped_after, cap), (temporal, 1 + cap)):
         assert (merge(X, Pixels(now, index), old, sources, chance, mis=WEIGHTS["talbot"], cap=cap).c == found).all()
+
+
+@pytest.mark.parametrize("canonical", [[], [0, 1, 2]], ids=["none", "all"])
+def test_pairs_with_swapped_counts_weigh_by_confidence_where_there_are_no_pairs(canonical) -> None:
+    c = [np.array([k + 1.0]) for k in range(3)]
+    m = [swapped_pairwise(i, lambda j: np.array([0.3 + j]), Confidences(c, canonical)) for i in range(3)]
+    assert np.concatenate(m) == pytest.approx([1 / 6, 1 / 3, 1 / 2], rel=1e-12)
+
+
+def test_pairs_with_swapped_counts_are_right_where_both_sides_have_seen_as_much() -> None:
+    """ "Nothing shows while they are equal": one other input of the same confidence."""
+
+    def q(j: int) -> np.ndarray:
+        return np.array([0.3 + j])
+
+    for counts, same in (((2.0, 2.0), True), ((1.0, 3.0), False)):
+        c = Confidences([np.array([count]) for count in counts], [0])
+        m = [[float(weight(i, q, c)[0]) for i in range(2)] for weight in (swapped_pairwise, pairwise)]
+        assert (pytest.approx(m[1], rel=1e-12) == m[0]) == same
