@@ -215,6 +215,7 @@ ZOO = {
     "selection: ...{of the selected sample times J...": "bugs are found by name",
     "selection.density_of_chosen: ...np.where(X.W >{ => =} 0, ...": NOT_SELECTED,
     "selection.density_of_chosen: ...np.where(X.W > 0, X.x.number, {0 => ...": NOT_SELECTED,
+    "selection.EqualShares.candidates: ...{ratio => np.divide}...": "what is drawn has a density",
     "probe.bounds: ...own(stage, i, {0 => ...": NULL,
     "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
         "the edges of a null column are 0, which start bounds from below"
