@@ -188,6 +188,12 @@ TRACER3D = {
     "files.tone: ...{np.maximum(v, 0.0031308) => v}...": "tones are not negative",
     "witness._groups: return {list(dict.fromkeys(...": "the same kinds in the same order",
     "embree.Embree.visible: ...visible({x.take(doubt, axis=-1), y => y.take(doubt, axis=-1), x}...": SYMMETRIC,
+    "compare.errors: ...{float(metric(image, truth, MAP) => ...": PRINTS,
+    "compare.sheet: ...{, layout='constrained' => })": "how close to each other pictures stand",
+    "cli._thumbnails: def ...trees: int={8 => ...": "how smooth they are",
+    "cli._compare: {known(METHODS, method, 'method') => METHODS}": "every method's job asks as well",
+    "witness._dielectric: ...kinds[{0 => -1}] in ROUGH...": "all are rough, or none is",
+    "sensors.Pinhole.__post_init__: ...cross({forward, self.up => self.up, forward})...": SYMMETRIC,
     "render.blank: ...job.setting({0 => ...": "a scene has as many channels in every frame",
     "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
     "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,
@@ -209,6 +215,7 @@ AUDIT = {
     "mistakes.inputs_counted: ...len(p.{W => c})...": AS_MANY,
 }
 NOT_SELECTED = "the pass that follows selects no sample without light"
+ROUNDING = "options of rounding's size change no mean"
 NULL = "whichever cell a sample of weight 0 is in"
 ZOO = {
     "checks.worst_mean: ...sum(axis={- => }1)...": SHORT_TABLE,
@@ -216,11 +223,13 @@ ZOO = {
     "selection.density_of_chosen: ...np.where(X.W >{ => =} 0, ...": NOT_SELECTED,
     "selection.density_of_chosen: ...np.where(X.W > 0, X.x.number, {0 => ...": NOT_SELECTED,
     "selection.EqualShares.candidates: ...{ratio => np.divide}...": "what is drawn has a density",
+    "confidence.OneSeed.choose: ...np.where(high {- low  => }> 1e-14, ...": ROUNDING,
+    "shifts: ...{not mirrored...": "bugs are found by name",
     "probe.bounds: ...own(stage, i, {0 => ...": NULL,
     "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
         "the edges of a null column are 0, which start bounds from below"
     ),
-    "confidence.OneSeed.choose: ...high - low > {1e-14 => -0.99...": "options of rounding's size change no mean",
+    "confidence.OneSeed.choose: ...high - low > {1e-14 => -0.99...": ROUNDING,
     "weights.swapped_pairwise: ...canonical[{0 => -1}]...": SAME_DENSITY,
     "passes: ...Parts({along=TALBOT, ...": "the default",
 }

@@ -87,7 +87,7 @@ def test_pairs_with_swapped_counts_weigh_by_confidence_where_there_are_no_pairs(
 
 
 def test_pairs_with_swapped_counts_are_right_where_both_sides_have_seen_as_much() -> None:
-    """ "Nothing shows while they are equal": one other input of the same confidence."""
+    """As its story says, nothing shows while both have the same confidence."""
 
     def q(j: int) -> np.ndarray:
         return np.array([0.3 + j])

@@ -20,7 +20,7 @@ from tests.tracer3d.views import HYBRID
 from tracer3d import SCENES, embree
 from tracer3d.cli import main
 from tracer3d.embree import DOUBT, MET, OWN, Embree, with_embree
-from tracer3d.render import Job, blank, render
+from tracer3d.render import BESIDE, Job, blank, render
 from tracer3d.scenes import grey, lamp, matte, room
 from tracer3d.space import SOLID
 
@@ -225,6 +225,23 @@ def test_what_stands_a_millionth_of_the_extent_away_is_not_overlooked():
     assert s.extent == 1
     assert fast.intersect(x, w)[0] == pytest.approx(h, rel=1e-6)
     assert not fast.visible(x, x + 0.5 * w).any()
+
+
+@installed
+def test_rays_that_meet_nothing_name_a_facet_that_is_there_all_the_same():
+    s = scene(SOLID, [matte(grey(0.5))], room(0, emission=grey(1.0)))
+    x = np.random.default_rng(9).uniform(2, 3, (3, 100))
+    for each in (s, with_embree(s)):
+        t, prim = each.intersect(x, normalize(x))
+        assert (t == np.inf).all()
+        assert ((prim >= 0) & (prim < s.S)).all()
+
+
+def test_the_time_of_a_frame_grows_with_the_surfaces_by_brute_force_and_not_by_embree(monkeypatch):
+    monkeypatch.setattr("tracer3d.render.embree", lambda: None)
+    surfaces = len(SCENES["cornell"]().scene.material)
+    brute, fast = (Job("cornell", "path", intersect=each).hours() for each in ("brute", "embree"))
+    assert brute / fast == pytest.approx((surfaces + BESIDE) / BESIDE, rel=1e-12)
 
 
 @installed

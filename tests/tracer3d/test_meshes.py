@@ -137,6 +137,11 @@ def test_whether_a_triangle_has_area_goes_by_its_shape_and_not_by_its_size_down_
     assert with_area(np.array(thin)).tolist() == [True, False, True]
 
 
+def test_a_small_triangle_beside_a_large_one_has_an_area():
+    corners = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    assert with_area(np.concatenate([1e-9 * corners, 1e9 * corners, 0 * corners])).tolist() == [True, True, False]
+
+
 @pytest.mark.parametrize(("side", "found"), [(2 * SPECK, True), (0.5 * SPECK, False)])
 def test_what_is_smaller_than_a_speck_has_no_area(side, found):
     assert with_area(side * np.array([[[0.0, 0, 0], [1, 0, 0], [0, 0, 0.7]]])).tolist() == [found]

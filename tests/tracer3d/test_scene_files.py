@@ -424,3 +424,12 @@ def test_a_mesh_of_too_many_triangles_is_refused_before_one_of_them_is_placed(tm
     monkeypatch.setattr(scene_files.meshes, "placed", lambda *_: pytest.fail("placed"))
     with pytest.raises(ValueError, match="4 triangles, more than 3"):
         read(written(tmp_path, ROOM + MESH))
+
+
+@pytest.mark.parametrize("shape", ["mesh", "sphere"])
+def test_an_empty_list_of_a_shape_is_as_good_as_none(tmp_path, shape):
+    none = ROOM.partition("[[sphere]]")[0] + "[[triangle]]" + ROOM.partition("[[triangle]]")[2]
+    assert "sphere" not in none
+    empty = read(written(tmp_path, f"{shape} = []\n{none}")).setting.scene
+    assert (empty.corners == read(written(tmp_path, none)).setting.scene.corners).all()
+    assert empty.radii.size == 0
