@@ -225,6 +225,7 @@ ZOO = {
     "selection.EqualShares.candidates: ...{ratio => np.divide}...": "what is drawn has a density",
     "confidence.OneSeed.choose: ...np.where(high {- low  => }> 1e-14, ...": ROUNDING,
     "shifts: ...{not mirrored...": "bugs are found by name",
+    "selection.offer_against_old_sum: ...np.where(w > {0 => -1}, ...": "either of two samples without weight",
     "probe.bounds: ...own(stage, i, {0 => ...": NULL,
     "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
         "the edges of a null column are 0, which start bounds from below"
