@@ -178,7 +178,7 @@ TRACER3D = {
     "scenes.Setting.__post_init__: check_view(self.scene, self.view(32, {18 => ...": LOOKED,
     "render.Job.hours: ...RAY / {3600 => ...": "an estimate is told in two digits",
     "methods.reuse_in_tiles: order = tiles(shape{, SIDE => })": "the default",
-    "cli._picture_options: camera.add_argument('--still', ...dest='moving',  => }...": "the default is not set again",
+    "cli._picture_options: ...add_argument('--still', ...dest='moving',  => }...": "the default is not set again",
     "cli._path_traced: ...{desc='reference',  => }...": "words of a bar",
     "compare.sheet: figure.savefig(path, dpi={150 => ...": "how finely it is drawn",
     "cli._path_traced: ..._chances(job.seed + {1 => 2}...": "any seed but that of what it is held against",
