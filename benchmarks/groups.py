@@ -78,8 +78,23 @@ ORACLE = {
     "scenes.random_scene: ...for j in range({ => 1, }count)...": "nothing is below 0",
     "enumeration.outcomes: ...{lanes, *open_lanes => *open_lanes, lanes}...": "a sum in another order",
 }
+WHOLE = "a whole number either way"
+AS_MANY = "as many confidences as weights"
+TABLE = "motion is a table (film, n)"
 ELIMINATED = "elimination in another order"
 OF_THEORY = {
+    "area.area_temporal: return gris([{canonical, *shared => *shared, canonical}]...": "inputs in another order",
+    "gradient_loop: Partners = ...": "a type",
+    "gradient_loop: View = ...": "a type",
+    "gradient_loop: Parts = ...": "a type",
+    "gradient_loop: History = ...": "a type",
+    "gradient_loop.columns_of: ...{W => c})": AS_MANY,
+    "gradient_loop.replaced: order[columns] = len(X.{W => c})...": AS_MANY,
+    "gradient_loop.replaced: order = np.arange(len(X.{W => c}))": AS_MANY,
+    "gradient_loop.Group.__post_init__: ...{int(np.prod(self.shape) => np.prod(self.shape}):": WHOLE,
+    "gradient_loop.forward: ...{int(np.prod(shape) => np.prod(shape})...": WHOLE,
+    "gradient_loop.in_space: ...[{here, *near => *near, here}]": "inputs in another order",
+    "area.overlapped: by = by[:, index % by.shape[{- => }1]]": TABLE,
     "metrics.neighbour_correlation: ...[..., {:-r], e[..., r: => r:], e[..., :-r}])...": "a correlation is symmetric",
     "decorrelation.bounded: ...all(axis=0), 1.0 => 1.0, inside...": TRUTH,
     "decorrelation.attempt: apart(move.{p_hat, move.p_hat_new => p_hat_new, move.p_hat}...": "apart is symmetric",
@@ -95,6 +110,8 @@ OF_THEORY = {
     "poisson.ends: ...swapaxes(-1{, -1 - k =>  - k, -1})...": "swapping is symmetric",
     "poisson.by_transform.solve: ...{, overwrite_x=True => }))": "the same numbers, in more memory",
     "poisson.by_transform.solve: ...overwrite_x={True => False}))": "the same numbers, in more memory",
+    "poisson._along: factors[-1 {- => +} k] = ...": "an image has two axes at most, and -2 is the same as 0",
+    "poisson.checked: ...np.asarray(g{, dtype=float => })...": "gradients meet the image, which has 64 bits",
     "poisson.by_elimination: ...{permc_spec='MMD_AT_PLUS_A',  => }...": ELIMINATED,
     "poisson.by_elimination: ...{diag_pivot_thresh=0.0,  => }...": ELIMINATED,
     "poisson.by_elimination: ...{, options={'SymmetricMode': True} => })": ELIMINATED,
@@ -104,6 +121,15 @@ OF_THEORY = {
     "poisson.symbol: ...sparse=True => }...": "the same numbers, in more memory",
     "poisson.symbol: ...sparse={True => False}...": "the same numbers, in more memory",
     "poisson.checked: _forward({g, own => own, g}, name)": "a product is symmetric",
+    "poisson_l1: ROUNDS, COOLING = ({60 => ...": "by then no more steps are taken",
+    "poisson_l1.normal_equations.product: ...{v => primal}.shape))": "both are of one shape",
+    "poisson_l1.l1: ...scale([{alpha * to_primal, *to_gradients => *to_gradients, alpha * to_primal}]...": (
+        "a sum in another order"
+    ),
+    "poisson_l1.l1_norm: ...{alpha * to_primal, *to_gradients => *to_gradients, alpha * to_primal}...": (
+        "a sum in another order"
+    ),
+    "poisson_l1.scale: ...np.where(mean > 0, mean, {1 => ...": "where all fits, residuals are 0 in any scale",
     "poisson_l1.normal_equations...{w_g, steps => steps, w_g}...": "a product is symmetric",
     "poisson_l1.normal_equations: ...{w_g, gradients => gradients, w_g}...": "a product is symmetric",
     "poisson_l1.conjugate_gradients: ...dot({r, z => z, r})...": "a product is symmetric",
@@ -111,11 +137,20 @@ OF_THEORY = {
 SYMMETRIC = "one and the other are treated alike"
 PRINTS = "a number prints alike, whatever its type"
 NAMED_FIRST = "which of two mistakes is named first"
+NOT_BOTH = "without both depths, one alone is apart already, and none is not: nothing exceeds an infinite limit"
 TRANSPORT = {
     "reading._put_scattering: ...np.maximum(lobe, {0 => -1}))": "of ALL lobes, what one does is not used",
     "shifts.shift_path: if {start < stop => True}:": "no columns are no work",
     "shift_identity._means: ...((i <{ => =} j) == up)": "no path is shifted to its own pixel",
     "direction_measure.direction_jacobian: ...{x => y}.c - 1, ...": "only asked where y reconnects where x does",
+    "edges.unlike: ...np.isfinite(t_i){ & np.isfinite(t_j) => })": NOT_BOTH,
+    "edges.unlike: ...np.isfinite({t_i) & np.isfinite( => }t_j))": NOT_BOTH,
+    "edges.unlike: apart = ~met | {both &  => }...": NOT_BOTH,
+    "edges.unlike: apart = ...{np.where(both, t_i, 0) => t_i}...": NOT_BOTH,
+    "edges.unlike: apart = ...{np.where(both, t_j, 0) => t_j}...": NOT_BOTH,
+    "edges.unlike: ...np.where(both, t_i, {0 => ...": NOT_BOTH,
+    "edges.unlike: ...np.where(both, t_j, {0 => ...": NOT_BOTH,
+    "edges.unlike: ...dot(g.n[:, {i], g.n[:, j => j], g.n[:, i}])...": "a product is symmetric",
 }
 FLATLAND2D = {
     "pictures.view: for pixel, u in ...({FILM - 1, 1.0 => 1.0, FILM - 1})):": "a place on the film is pixel + u",
@@ -130,7 +165,36 @@ FLATLAND2D = {
     "scenes: ...{clear_coat, furnace => furnace, clear_coat}...": "scenes are found by name",
     "tone.decoded: ...{np.maximum(t, 0.04045) => t}...": "tones are not negative",
 }
+LOOKED = "how finely is looked whether anything is seen"
 TRACER3D = {
+    "cli._thumbnails: ..._chances({1 => ...": "any seed will do",
+    "meshes._by_trimesh: ...{skip_materials=True,  => }...": "what it is given names no materials",
+    "meshes._by_trimesh: ...skip_materials={True => ...": "what it is given names no materials",
+    "embree.Embree._between: ...{, mode='clip' => }...": "-1 is the last facet as well, and its answer is not used",
+    "embree.Embree._met: ...{, mode='clip' => }...": "-1 is the last facet as well, and its answer is not used",
+    "witness._kinds: ...{int(m) => m}...": "a number is the same key, whatever its type",
+    "sensors.Pinhole.project: to = ...{, dtype=float => }...": "whole numbers subtract alike",
+    "scenes.Setting.__post_init__: check_view(self.scene, self.view({32 => ...": LOOKED,
+    "scenes.Setting.__post_init__: check_view(self.scene, self.view(32, {18 => ...": LOOKED,
+    "render.Job.hours: ...RAY / {3600 => ...": "an estimate is told in two digits",
+    "methods.reuse_in_tiles: order = tiles(shape{, SIDE => })": "the default",
+    "cli._picture_options: ...add_argument('--still', ...dest='moving',  => }...": "the default is not set again",
+    "cli._path_traced: ...{desc='reference',  => }...": "words of a bar",
+    "compare.sheet: figure.savefig(path, dpi={150 => ...": "how finely it is drawn",
+    "cli._path_traced: ..._chances(job.seed + {1 => 2}...": "any seed but that of what it is held against",
+    "shapes.quad: a, b, c, d = np.asarray(corners{, dtype=float => })": "whole numbers subtract alike",
+    "embree.Embree._first: if not { => not }len(left):": "what is left is asked of all facets, more slowly",
+    "sensors.Pinhole.through: ...np.ones(len({column => row}))": "as many columns as rows",
+    "files.tone: ...{np.maximum(v, 0.0031308) => v}...": "tones are not negative",
+    "witness._groups: return {list(dict.fromkeys(...": "the same kinds in the same order",
+    "embree.Embree.visible: ...visible({x.take(doubt, axis=-1), y => y.take(doubt, axis=-1), x}...": SYMMETRIC,
+    "compare.errors: ...{float(metric(image, truth, MAP) => ...": PRINTS,
+    "compare.sheet: ...{, layout='constrained' => })": "how close to each other pictures stand",
+    "cli._thumbnails: def ...trees: int={8 => ...": "how smooth they are",
+    "cli._compare: {known(METHODS, method, 'method') => METHODS}": "every method's job asks as well",
+    "witness._dielectric: ...kinds[{0 => -1}] in ROUGH...": "all are rough, or none is",
+    "sensors.Pinhole.__post_init__: ...cross({forward, self.up => self.up, forward})...": SYMMETRIC,
+    "render.blank: ...job.setting({0 => ...": "a scene has as many channels in every frame",
     "embree.Embree._nearest_facet: near = np.zeros(x.shape[{- => }1])": "points are (3, N)",
     "sensors.Pinhole.project: ...dot({forward, to => to, forward})": SYMMETRIC,
     "sensors.Pinhole.project: ...dot({right, to => to, right})...": SYMMETRIC,
@@ -148,13 +212,25 @@ AUDIT = {
     "compare.Check.worst: columns = int(self.wrong.reshape(-{1 => 2}...": "any negative number will do",
     "load._check_values: for name in ('{u', 'u_stream => u_stream', 'u}'):": "which of two mistakes is named first",
     "mistakes.at_s: ...[{0 => -1}])": "the first of one row is the last",
-    "mistakes.inputs_counted: ...len(p.{W => c})...": "as many confidences as weights",
+    "mistakes.inputs_counted: ...len(p.{W => c})...": AS_MANY,
 }
+NOT_SELECTED = "the pass that follows selects no sample without light"
+ROUNDING = "options of rounding's size change no mean"
+NULL = "whichever cell a sample of weight 0 is in"
 ZOO = {
+    "checks.worst_mean: ...sum(axis={- => }1)...": SHORT_TABLE,
+    "selection: ...{of the selected sample times J...": "bugs are found by name",
+    "selection.density_of_chosen: ...np.where(X.W >{ => =} 0, ...": NOT_SELECTED,
+    "selection.density_of_chosen: ...np.where(X.W > 0, X.x.number, {0 => ...": NOT_SELECTED,
+    "selection.EqualShares.candidates: ...{ratio => np.divide}...": "what is drawn has a density",
+    "confidence.OneSeed.choose: ...np.where(high {- low  => }> 1e-14, ...": ROUNDING,
+    "shifts: ...{not mirrored...": "bugs are found by name",
+    "selection.offer_against_old_sum: ...np.where(w > {0 => -1}, ...": "either of two samples without weight",
+    "probe.bounds: ...own(stage, i, {0 => ...": NULL,
     "confidence.OneSeed.choose: ...{np.where(null, start, low[s, column]) => low[s, column]}...": (
         "the edges of a null column are 0, which start bounds from below"
     ),
-    "confidence.OneSeed.choose: ...high - low > {1e-14 => -0.99...": "options of rounding's size change no mean",
+    "confidence.OneSeed.choose: ...high - low > {1e-14 => -0.99...": ROUNDING,
     "weights.swapped_pairwise: ...canonical[{0 => -1}]...": SAME_DENSITY,
     "passes: ...Parts({along=TALBOT, ...": "the default",
 }
@@ -200,7 +276,10 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         ),
         "theory": Group(
             tuple(f"restir_ref/{name}.py" for name in THEORY),
-            ("tests/core/test_*.py", "tests/oracle/test_*.py", "tests/flatland/test_gbuffer.py"),
+            (
+                *("tests/core/test_*.py", "tests/oracle/test_*.py"),
+                *("tests/flatland/test_gbuffer.py", "tests/flatland/test_gradients.py"),
+            ),
             equivalent=OF_THEORY,
         ),
         "oracle": Group(

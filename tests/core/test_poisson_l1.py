@@ -123,6 +123,26 @@ def test_steps_end_where_the_residual_is_small_enough_and_not_long_after():
     assert products > 10
 
 
+def test_where_nothing_is_left_to_solve_no_step_is_taken():
+    asked: list[int] = []
+    x = conjugate_gradients(lambda v: asked.append(1) or v, np.zeros((2, 5)), np.zeros((2, 5)), lambda r: r, (-1,))
+    assert not x.any()
+    assert len(asked) == 1
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_an_image_that_is_done_stays_as_it_is_while_others_of_its_stack_go_on(size):
+    b = size * np.random.default_rng(1).standard_normal((2, 50))
+    easy, hard = np.linspace(1, 2, 50), np.geomspace(1, 1e4, 50)
+
+    def solve(a: Array, right: Array) -> Array:
+        return conjugate_gradients(lambda v: a * v, right, np.zeros_like(right), lambda r: r, (-1,))
+
+    stack, alone = solve(np.stack([easy, hard]), b), solve(easy[None], b[:1])
+    assert stack[0] == pytest.approx(alone[0], rel=1e-9, abs=1e-12 * size)
+    assert stack[1] == pytest.approx(b[1] / hard, abs=1e-3 * size)
+
+
 # ---------------------------------------------------------------- medians
 
 

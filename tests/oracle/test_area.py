@@ -8,11 +8,10 @@ import pytest
 from restir_ref.area import Displaced, area_temporal, one_by_area, overlapped, still
 from restir_ref.batch import Array
 from restir_ref.chance import Live
-from restir_ref.gradient import SIGNS, Pairs
+from restir_ref.gradient import SIGNS
 from restir_ref.gradient_loop import (
     ACROSS_SIGNS,
     GRADIENT,
-    PARTS,
     SAME_SIGN,
     UNSIGNED,
     GradientPreset,
@@ -22,6 +21,7 @@ from restir_ref.gradient_loop import (
     in_space,
     in_time,
     nearer,
+    pairs_of,
     sampled,
     shaded,
     step,
@@ -211,6 +211,15 @@ def test_what_the_previous_frame_did_not_show_has_no_source() -> None:
     assert only["columns"].tolist() == [NOWHERE, 0, NOWHERE]
 
 
+def test_where_motion_is_known_along_one_axis_only_there_is_no_source() -> None:
+    known = np.zeros((2, 4))
+    for axis in (0, 1):
+        by = known.copy()
+        by[axis, 1] = np.inf
+        (only,) = sources((2, 2), by)
+        assert only["columns"].tolist() == [0, NOWHERE, 2, 3]
+
+
 def test_a_displacement_of_another_number_of_axes_is_refused() -> None:
     with pytest.raises(ValueError, match=r"a film of shape \(3, 4\) has 2 axes, but displacements have 1"):
         overlapped((3, 4), np.zeros((1, 12)), np.arange(12))
@@ -225,6 +234,17 @@ def test_there_and_back_is_the_same_place() -> None:
     assert (y.J > 0).any()
     assert np.array_equal(back.x[y.J > 0], x[y.J > 0])
     assert (y.J * back.J)[y.J > 0] == pytest.approx(1, rel=1e-12)
+
+
+def test_all_of_a_displaced_image_but_its_shifts_is_that_of_the_image() -> None:
+    frame = film_scene(0).now
+    here, index, x = Displaced(frame, BY), np.repeat([0, 1], K), np.tile(np.arange(K), 2)
+    assert here.n == frame.n
+    (own,), (drawn,) = (list(of.candidates(index, Live(np.random.default_rng(1)))) for of in (frame, here))
+    assert np.array_equal(own, drawn)
+    assert np.array_equal(here.target(index, x), frame.target(index, x))
+    assert np.array_equal(here.contribution(index, x), frame.contribution(index, x))
+    assert len(np.unique(frame.contribution(index, x))) > K
 
 
 # ---------------------------------------------------------------- gradient frames
@@ -242,7 +262,7 @@ def group(of: dict, by: Array = BY) -> Group:
 
 
 def pair_group(frame: Frame, *parts: str) -> Group:
-    return group({part: Pairs(frame, RING, PARTS[part]) for part in parts})
+    return group(pairs_of(frame, RING, dict.fromkeys(parts, parts)))
 
 
 def pair_frames(scene: Scene, *parts: str, partners=SAME_SIGN):
@@ -377,13 +397,16 @@ def test_history_of_another_size_is_refused() -> None:
         in_time(group({"primal": small}), X, (there, X), PRESET.pixels, {"primal": ("primal",)}, Live(None))
 
 
-def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one() -> None:
-    found = forward((2, 3))
-    (dx, shape_x), (dy, shape_y) = found["dx"], found["dy"]
-    assert (shape_x, shape_y) == ((2, 2), (1, 3))
-    image = np.arange(6.0).reshape(2, 3) ** 2
+@pytest.mark.parametrize("shape", [(2, 3), (3, 2), (4, 5), (1, 4)])
+def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one(shape) -> None:
+    (dx, shape_x), (dy, shape_y) = forward(shape).values()
+    assert [*forward(shape)] == ["dx", "dy"]
+    image = np.arange(np.prod(shape)).reshape(shape) ** 2
     assert np.array_equal(np.subtract(*image.ravel()[dx]).reshape(shape_x), np.diff(image, axis=1))
     assert np.array_equal(np.subtract(*image.ravel()[dy]).reshape(shape_y), np.diff(image, axis=0))
+
+
+def test_pairs_of_rows_and_of_several_crops_stay_inside_of_each() -> None:
     assert forward((4,))["dx"][0].tolist() == [[1, 2, 3], [0, 1, 2]]
     assert forward((2,), crops=2)["dx"][0].tolist() == [[1, 3], [0, 2]]
 
@@ -412,6 +435,16 @@ def test_overlapped_pixels_bring_their_shares_of_a_capped_confidence() -> None:
     assert third.c.tolist() == [3.0, 3.0]
     edge = in_time(group({"primal": now}, -BY / 2), X, (group({"primal": before}), Y), preset, partners, chance)
     assert edge["primal"].c.tolist() == [2.5, 2.5]  # a quarter of either square lies outside of the row
+
+
+@pytest.mark.claims("GPT-A05", part="confidences of the overlapped pixels")
+@pytest.mark.parametrize(("by", "found"), [(BY, 3.0), (BY / 2, 3.0), (-BY / 2, 2.5)])
+def test_area_reservoirs_have_the_confidence_of_the_area_that_the_previous_frame_showed(by, found) -> None:
+    before, now = film_scene(1).frames
+    index, chance = np.arange(2), Live(np.random.default_rng(1))
+    X, Y = (replace(initial(Pixels(of, index), chance), c=c) for of, c in ((now, ONE), (before, 9 * ONE)))
+    shown = [(Pixels(still(before, by), columns), share) for columns, share in overlapped((2,), by, index)]
+    assert area_temporal(X, Pixels(Displaced(now, by), index), Y, shown, chance, cap=2.0).c.tolist() == [found] * 2
 
 
 ONE = np.ones(2)

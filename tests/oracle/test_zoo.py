@@ -172,5 +172,6 @@ def test_rebuilt_passes_do_what_the_library_does_before_anything_is_broken(merge
 def test_a_bug_differs_from_its_right_loop_in_few_parts(name) -> None:
     right, wrong = vars(ALL[name].right), vars(ALL[name].wrong)
     replaced = {part for part in right if right[part] is not wrong[part] and right[part] != wrong[part]}
-    alike = [{"here", "near"}, {"along", "across"}, {"temporal", "spatial"}, {"along", "cap"}]
+    alike = [{"here", "near"}, {"along", "across"}, {"temporal", "spatial"}]
+    alike += [{"along", "cap"}] * (wrong["cap"] == np.inf)  # whose weights cap what the pass does not
     assert len(replaced) == 1 or replaced in alike

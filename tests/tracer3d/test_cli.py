@@ -8,6 +8,7 @@ from matplotlib.image import imread
 
 from tracer3d import cli, compare, files, methods
 from tracer3d.methods import METHODS
+from tracer3d.render import Job, blank, render
 from tracer3d.scenes import SCENES
 
 SMALL = ["--size", "8x8", "--crop", "--depth", "2"]
@@ -30,6 +31,16 @@ def test_the_same_command_with_more_frames_goes_on(tmp_path):
         assert run("render", "crease", "--method", "path", "--frames", frames, *SMALL, "--out", first) == 0
     assert run("render", "crease", "--method", "path", "--frames", 5, *SMALL, "--out", both) == 0
     assert first.with_suffix(".pfm").read_bytes() == both.with_suffix(".pfm").read_bytes()
+
+
+def test_frames_that_are_done_are_not_rendered_again(tmp_path, monkeypatch):
+    right, rendered = methods.traced, []
+    monkeypatch.setattr(methods, "traced", lambda *asked: rendered.append(1) or right(*asked))
+    for frames, sofar in ((2, 2), (5, 5), (5, 5), (4, 5)):
+        run("render", "crease", "--method", "path", "--frames", frames, *SMALL, "--out", tmp_path / "a.png")
+        assert len(rendered) == sofar
+    run("render", "crease", "--method", "path", "--frames", 1, "--anew", *SMALL, "--out", tmp_path / "a.png")
+    assert len(rendered) == 6
 
 
 def interrupted_at(monkeypatch, frame: int) -> None:
@@ -138,6 +149,21 @@ def test_words_that_are_no_numbers_are_refused(capsys, words, said):
     assert said in capsys.readouterr().err
 
 
+NUMBERS = {
+    "render": {"frames": "3", "depth": "3", "seed": "3"},
+    "compare": {"trees": "3", "rays": "2.5", "seconds": "0.5", "depth": "3", "seed": "3"},
+}
+
+
+@pytest.mark.parametrize(("command", "option"), [(c, option) for c, options in NUMBERS.items() for option in options])
+def test_every_number_is_read_as_one_and_words_instead_of_it_are_refused(capsys, command, option):
+    word = NUMBERS[command][option]
+    assert getattr(cli.parser().parse_args([command, "crease", f"--{option}", word]), option) == float(word)
+    with pytest.raises(SystemExit, match="2"):
+        cli.parser().parse_args([command, "crease", f"--{option}", "many"])
+    assert "'many' is not a" in capsys.readouterr().err
+
+
 def test_a_reference_of_another_size_and_a_comparison_without_budget_are_refused(tmp_path, capsys):
     files.write_pfm(tmp_path / "r.pfm", np.ones((3, 4, 6)))
     assert run("render", "crease", *SMALL, "--reference", tmp_path / "r.pfm", "--out", tmp_path / "a.png") == 2
@@ -197,3 +223,13 @@ def test_a_table_tells_the_errors_of_every_method():
     assert [float(each) for each in lines[1].split()[4:]] == [0, 0, 0]
     assert all(float(each) > 0 for each in lines[2].split()[4:])
     assert len(lines[2].split()) == 7
+    R = rows[0].picture.mean[0]
+    assert float(lines[2].split()[4]) == pytest.approx((0.1 * R / (0.01 * R.mean() + R)).mean(), abs=1e-4)
+
+
+def test_our_own_reference_shares_no_random_numbers_with_what_is_held_against_it():
+    job = Job("crease", "path", size=(8, 8), depth=2)
+    *_, same = render(job, cli._chances(job.seed), 2, blank(job), job.compiled())
+    *_, again = render(job, cli._chances(job.seed), 2, blank(job), job.compiled())
+    assert np.array_equal(same.mean, again.mean)
+    assert (cli._path_traced(job, 2) == same.mean).mean() < 0.1

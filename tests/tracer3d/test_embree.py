@@ -20,7 +20,7 @@ from tests.tracer3d.views import HYBRID
 from tracer3d import SCENES, embree
 from tracer3d.cli import main
 from tracer3d.embree import DOUBT, MET, OWN, Embree, with_embree
-from tracer3d.render import Job, blank, render
+from tracer3d.render import BESIDE, Job, blank, render
 from tracer3d.scenes import grey, lamp, matte, room
 from tracer3d.space import SOLID
 
@@ -99,10 +99,10 @@ def test_restir_pt_by_embree_has_the_pixels_of_brute_force():
 # ---------------------------------------------------------------- edges, ends, and what lies in one place
 
 
-def past_an_edge(n: int = 4000) -> tuple[Array, Array]:
-    """Ends of segments that pass the door's edge (x = 1, z = .56) of Ajar3 within 1e-6, (3, n) each."""
+def past_an_edge(n: int = 4000, within: float = 1e-6) -> tuple[Array, Array]:
+    """Ends of segments that pass the door's edge (x = 1, z = .56) of Ajar3 so near, (3, n) each."""
     rng = np.random.default_rng(2)
-    edge = np.stack([np.ones(n), rng.uniform(0.1, 0.8, n), 0.56 + rng.uniform(-1e-6, 1e-6, n)])
+    edge = np.stack([np.ones(n), rng.uniform(0.1, 0.8, n), 0.56 + rng.uniform(-within, within, n)])
     x = np.stack([rng.uniform(0.1, 0.9, n), rng.uniform(0.1, 0.9, n), rng.uniform(0.1, 0.9, n)])
     return x, edge + rng.uniform(0.2, 0.8, n) * (edge - x)
 
@@ -116,6 +116,17 @@ def one_sided(s: Scene) -> int:
 @installed
 def test_visibility_is_the_same_from_both_ends():
     assert one_sided(both("ajar")[1]) == 0
+
+
+@installed
+def test_what_passes_an_edge_nearer_than_float32_can_tell_is_never_hidden_where_brute_force_sees():
+    """What float32 meets is judged in float64; what it misses, beyond the edge or not, is not met."""
+    plain, fast = both("ajar")
+    x, y = past_an_edge(within=1e-8)
+    clear = plain.visible(x, y)
+    assert 0.3 < clear.mean() < 0.7
+    assert fast.visible(x, y)[clear].all()
+    assert not fast.visible(x, y).all()
 
 
 @installed
@@ -188,6 +199,62 @@ def test_if_float64_were_not_asked_more_of_them_would_meet_something_else():
     fast = with_embree(s)
     _, far = elsewhere(s, replace(fast, surfaces=Trusting(**vars(fast.surfaces))))
     assert far > SILHOUETTES
+
+
+@installed
+@pytest.mark.parametrize("size", [2.0**-12, 1.0, 2.0**12])
+def test_walls_beside_the_eye_are_met_and_hide_whatever_the_size_of_the_scene(size):
+    """In a corner, .05 to .5 % of the room from its walls: what is overlooked is a share of the extent, and less."""
+    facets = [replace(each, corners=(size * np.array(each.corners)).tolist()) for each in room(0, emission=grey(1.0))]
+    s, rng = scene(SOLID, [matte(grey(0.5))], facets), np.random.default_rng(5)
+    fast, x, w = with_embree(s), size * rng.uniform(5e-4, 5e-3, (3, 2000)), normalize(-rng.random((3, 2000)))
+    (t, prim), (t_fast, prim_fast) = s.intersect(x, w), fast.intersect(x, w)
+    assert t_fast == pytest.approx(t, rel=1e-9)
+    assert (prim_fast == prim).all()
+    assert fast.visible(x, x + 0.9 * t * w).all()
+    assert not fast.visible(x, x + 1.1 * t * w).any()
+
+
+@installed
+def test_what_stands_a_millionth_of_the_extent_away_is_not_overlooked():
+    """START is half of that."""
+    s, rng, h = scene(SOLID, [matte(grey(0.5))], room(0, emission=grey(1.0))), np.random.default_rng(8), 0.9 * 2.0**-20
+    fast, axis, far = with_embree(s), np.repeat(np.arange(3), 200), np.tile([0, 1], 300)
+    x, w, column = rng.uniform(0.1, 0.9, (3, 600)), np.zeros((3, 600)), np.arange(600)
+    x[axis, column], w[axis, column] = np.where(far, 1 - h, h), np.where(far, 1.0, -1.0)
+    assert s.extent == 1
+    assert fast.intersect(x, w)[0] == pytest.approx(h, rel=1e-6)
+    assert not fast.visible(x, x + 0.5 * w).any()
+
+
+@installed
+def test_rays_that_meet_nothing_name_a_facet_that_is_there_all_the_same():
+    s = scene(SOLID, [matte(grey(0.5))], room(0, emission=grey(1.0)))
+    x = np.random.default_rng(9).uniform(2, 3, (3, 100))
+    for each in (s, with_embree(s)):
+        t, prim = each.intersect(x, normalize(x))
+        assert (t == np.inf).all()
+        assert ((prim >= 0) & (prim < s.S)).all()
+
+
+def test_the_time_of_a_frame_grows_with_the_surfaces_by_brute_force_and_not_by_embree(monkeypatch):
+    monkeypatch.setattr("tracer3d.render.embree", lambda: None)
+    surfaces = len(SCENES["cornell"]().scene.material)
+    brute, fast = (Job("cornell", "path", intersect=each).hours() for each in ("brute", "embree"))
+    assert brute / fast == pytest.approx((surfaces + BESIDE) / BESIDE, rel=1e-12)
+
+
+@installed
+def test_rays_along_the_wall_that_they_leave_meet_what_brute_force_meets():
+    """They never rise above it, in float32 or in float64."""
+    plain, fast = both("matte_cornell")
+    rng = np.random.default_rng(6)
+    x, w = rng.uniform(0.01, 0.99, (2, 3, 500))
+    x[1], w = 0.0, normalize((w - 0.5) * np.array([[1.0], [0.0], [1.0]]))
+    t, prim = fast.intersect(x, w)
+    assert t == pytest.approx(plain.intersect(x, w)[0], rel=1e-9)
+    assert (prim == plain.intersect(x, w)[1]).all()
+    assert (fast.visible(x, x + 0.5 * w) == plain.visible(x, x + 0.5 * w)).all()
 
 
 @installed

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from restir_ref.batch import Array
 from restir_ref.transport.scene import Facet, scene
 from tracer3d import meshes
-from tracer3d.meshes import Placement, load, placed, with_area
+from tracer3d.meshes import FLAT, SPECK, Placement, load, placed, with_area
 from tracer3d.scenes import grey, matte
 from tracer3d.shapes import lamp
 from tracer3d.space import SOLID
+from tracer3d.tables import SMALLEST, number
 
 pytest.importorskip("trimesh", reason="needs the extra `mesh`")
 
@@ -52,6 +53,7 @@ CUBES = {
     "commented": (".obj", b"mtllib x.mtl\n" + obj().replace(b"\n", b" # a remark\n")),
     "coloured": (".obj", obj().replace(b"\nf", b" 1 0.5 0\nf", 1)),
     "continued": (".obj", obj().replace(b"f 1 2", b"f 1 \\\n2")),
+    "faces first": (".obj", b"\n".join(sorted(obj().split(b"\n"), key=lambda row: row[:1]))),
     "ply": (".ply", ply()),
     "little-endian ply": (".ply", binary("<")),
     "big-endian ply": (".ply", binary(">")),
@@ -128,6 +130,28 @@ def test_axes_go_where_they_are_sent(at, wanted):
     assert placed(X, at)[0] == pytest.approx(np.array(wanted, dtype=float), abs=1e-12)
 
 
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e6])
+def test_whether_a_triangle_has_area_goes_by_its_shape_and_not_by_its_size_down_to_a_speck(size):
+    height = size * np.array([2 * FLAT, 0.5 * FLAT, 1.0])
+    thin = [[[0.0, 0, 0], [size, 0, 0], [0, h, 0]] for h in height]
+    assert with_area(np.array(thin)).tolist() == [True, False, True]
+
+
+def test_a_small_triangle_beside_a_large_one_has_an_area():
+    corners = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    assert with_area(np.concatenate([1e-9 * corners, 1e9 * corners, 0 * corners])).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize(("side", "found"), [(2 * SPECK, True), (0.5 * SPECK, False)])
+def test_what_is_smaller_than_a_speck_has_no_area(side, found):
+    assert with_area(side * np.array([[[0.0, 0, 0], [1, 0, 0], [0, 0, 0.7]]])).tolist() == [found]
+
+
+@pytest.mark.parametrize("x", [0.5 * SMALLEST, SMALLEST, 2 * SMALLEST])
+def test_corners_of_meshes_are_0_where_numbers_of_scene_files_are(x):
+    assert (placed(np.full((1, 3, 3), x), Placement()) == number("").read(x)).all()
+
+
 @pytest.mark.parametrize("scale", [(2, 1, 1), (-2, 1, 1), (1, -1, 3), (-1, -1, -1)])
 def test_fronts_stay_outside_however_a_mesh_is_mirrored(tmp_path, scale):
     corners = loaded(tmp_path, *CUBES["obj"])
@@ -199,6 +223,7 @@ DAMAGE = {
     ),
     "binary cut off": (".ply", binary("<")[:-5], "trimesh cannot read it (ValueError: PLY is unexpected length!)"),
     "a binary index out of range": (".ply", binary("<")[:-4] + b"\x09\0\0\0", "6 faces 12 triangles can be read, with"),
+    "a binary index of no vertex": (".ply", binary("<")[:-4] + b"\xff\xff\xff\xff", "with corners -1 .. 7 of 8"),
     "another format": (".stl", "solid", "there is no mesh format '.stl': there are .obj, .ply"),
 }
 

@@ -56,6 +56,18 @@ def test_of_an_exr_with_four_channels_three_are_read(tmp_path):
 
 
 @needs_exr
+def test_a_grey_exr_is_read_as_one_channel(tmp_path):
+    import OpenEXR  # noqa: PLC0415  (an extra)
+
+    pixels = np.arange(6, dtype=np.float32).reshape(2, 3)
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, {"Y": pixels}).write(
+        str(tmp_path / "a.exr")
+    )
+    assert (files.read_linear(tmp_path / "a.exr") == pixels[None]).all()
+    assert files.read_linear(tmp_path / "a.exr").shape == (1, 2, 3)
+
+
+@needs_exr
 def test_errors_against_an_exr_are_those_against_a_pfm(tmp_path, capsys):
     said = []
     for suffix in (".exr", ".pfm"):

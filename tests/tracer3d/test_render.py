@@ -179,3 +179,21 @@ def test_errors_are_those_of_channel_means():
     assert found["RMSE"] == pytest.approx(0.1)
     assert found["MAPE"] == pytest.approx(0.1 / 1.01)
     assert compare.errors(R[::-1], R)["RMSE"] == 0
+
+
+def test_path_reuse_is_asked_for_whole_tiles_of_4_by_4_pixels_one_after_the_other(monkeypatch):
+    tiles = []
+
+    def path_reuse(t, pixel, chance, K):
+        tiles.extend(pixel.reshape(-1, K))
+        return np.zeros((t.scene.C, len(pixel)))
+
+    monkeypatch.setattr("tracer3d.methods.path_reuse", path_reuse)
+    pictures(replace(SMALL, method="path-reuse", size=(12, 8)), 1)
+    found = np.array(tiles)
+    row, column = found // 12, found % 12
+    assert np.array_equal(np.sort(found.ravel()), np.arange(96))
+    assert (np.ptp(row, axis=1) == 3).all()
+    assert (np.ptp(column, axis=1) == 3).all()
+    assert (row.min(axis=1) % 4 == 0).all()
+    assert (column.min(axis=1) % 4 == 0).all()

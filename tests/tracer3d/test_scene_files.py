@@ -407,3 +407,29 @@ def test_no_value_of_any_key_ends_in_a_traceback(tmp_path, at, value):
 def test_brackets_in_brackets_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"my.toml is no TOML"):
         read(written(tmp_path, "a = " + 5000 * "["))
+
+
+@pytest.mark.parametrize("kind", ["COLOUR", "EMISSION", "SCALE"])
+def test_one_number_stands_for_three_equal_ones(kind):
+    read = getattr(scene_keys, kind).read
+    for x in (0.25, 1):
+        assert read(x) == read([x, x, x]) == (x, x, x)
+    with pytest.raises((TypeError, ValueError)):
+        read([0.25, 0.25])
+
+
+@needs_trimesh
+def test_a_mesh_of_too_many_triangles_is_refused_before_one_of_them_is_placed(tmp_path, monkeypatch):
+    monkeypatch.setattr(scene_files, "MOST", 3)
+    monkeypatch.setattr(scene_files.meshes, "placed", lambda *_: pytest.fail("placed"))
+    with pytest.raises(ValueError, match="4 triangles, more than 3"):
+        read(written(tmp_path, ROOM + MESH))
+
+
+@pytest.mark.parametrize("shape", ["mesh", "sphere"])
+def test_an_empty_list_of_a_shape_is_as_good_as_none(tmp_path, shape):
+    none = ROOM.partition("[[sphere]]")[0] + "[[triangle]]" + ROOM.partition("[[triangle]]")[2]
+    assert "sphere" not in none
+    empty = read(written(tmp_path, f"{shape} = []\n{none}")).setting.scene
+    assert (empty.corners == read(written(tmp_path, none)).setting.scene.corners).all()
+    assert empty.radii.size == 0

@@ -10,7 +10,7 @@ from tests.core.test_bad_input import Mistake, faults
 from tests.tracer3d.views import AT_A_POINT, directed
 from tracer3d import SCENES, Pinhole, check_view, setting
 from tracer3d.scenes import Setting, two_rooms
-from tracer3d.sensors import FILM, facing
+from tracer3d.sensors import FILM, Mosaic, facing
 
 NAN, INF = np.nan, np.inf
 CAMERA = Pinhole((0.3, 0.6, 1.5), (0.9, 0.1, 0.2), 50, 30, 0.8, left=700, top=400)
@@ -110,6 +110,29 @@ def test_facing_tells_fronts_backs_and_nothing_apart():
     eyes = {1: (0.5, 0.5, 2.0), -1: (0.5, 0.5, -1.0), 0: (0.5, 0.5, 9.0)}
     for found, eye in eyes.items():
         assert facing(s, directed(eye, (0.5, 0.5, 10.0 if found == 0 else 0.0))) == [found]
+
+
+# ---------------------------------------------------------------- mosaics
+
+MOSAIC = Mosaic(CAMERA, ((3, 5), (700, 400), (1000, 20)))
+
+
+def test_pixels_of_a_mosaic_are_those_of_its_crops_one_crop_after_the_other():
+    crops = [replace(CAMERA, left=left, top=top) for left, top in MOSAIC.corners]
+    assert MOSAIC.n == sum(crop.n for crop in crops)
+    assert MOSAIC.shape == CAMERA.shape
+    assert MOSAIC.numbers == MOSAIC.film_numbers == CAMERA.numbers == CAMERA.film_numbers
+    u = np.random.default_rng(2).random((2, MOSAIC.n))
+    parts = [crop.ray(np.arange(crop.n), each) for crop, each in zip(crops, np.split(u, 3, axis=1), strict=True)]
+    for found, own in zip(MOSAIC.ray(np.arange(MOSAIC.n), u), zip(*parts, strict=True), strict=True):
+        assert np.array_equal(found, np.concatenate(own, axis=-1))
+
+
+def test_a_mosaic_of_no_crop_or_with_one_off_the_film_is_refused():
+    with pytest.raises(ValueError, match="at least one crop"):
+        replace(MOSAIC, corners=())
+    with pytest.raises(ValueError, match="begins at 1900 and has 50"):
+        replace(MOSAIC, corners=((3, 5), (1900, 5)))
 
 
 # ---------------------------------------------------------------- complaints

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from restir_ref.transport.scene import Facet
-from tracer3d.shapes import block, box, joined, lamp, quad, raised, rectangle, room, turned, walls
+from tracer3d.shapes import FLAT, block, box, joined, lamp, quad, raised, rectangle, room, turned, walls
 
 BASE = rectangle((0.2, 0.1), (0.5, 0.7), 0.3)
 
@@ -82,3 +82,15 @@ def test_quads_that_are_not_flat_are_refused():
     with pytest.raises(ValueError, match="in one plane"):
         joined([bent], 0)
     assert len(quad([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 1e-12)], 0)) == 2
+
+
+@pytest.mark.parametrize("far", [1, 2, 3])
+def test_how_flat_a_quad_must_be_goes_by_its_farthest_corner_whichever_that_is(far):
+    """The fourth corner may be as high above the plane of the others as FLAT times the quad's size."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    corners[far] *= 1000
+    corners[3, 2] = 0.5 * FLAT * 1000
+    assert len(quad(corners.tolist(), 0)) == 2
+    corners[3, 2] = 2 * FLAT * 1000
+    with pytest.raises(ValueError, match="in one plane"):
+        quad(corners.tolist(), 0)

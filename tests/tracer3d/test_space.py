@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from restir_ref.batch import Array
+from restir_ref.transport.vectors import norm, normalize
 from tests.transport.lobe_cases import integral, views
 from tracer3d.space import SOLID, Solid
 
@@ -68,3 +69,31 @@ def test_the_density_of_visible_normals_integrates_to_one(height):
 
     assert visible_area(v, density) == pytest.approx(1, abs=2e-3)
     assert abs(visible_area(v, lambda m: density(m) * (1 + height) / 2) - 1) > 0.3 * (1 - height)
+
+
+def test_microfacets_from_the_rim_of_the_disk_are_unit_vectors_too():
+    """There 1 - x^2 - y^2 is 0 but for rounding, of either sign."""
+    rng = np.random.default_rng(7)
+    u = rng.random((2, 4000))
+    u[rng.integers(2, size=4000), np.arange(4000)] = rng.integers(2, size=4000)
+    v = normalize(rng.normal(size=(3, 4000)) * np.array([[1.0], [1.0], [0.3]]))
+    v[2] = np.abs(v[2])
+    x, y = SOLID.ball(u)
+    rounding = 1 - x**2 - y**2
+    assert (rounding < 0).any()
+    assert np.abs(rounding).max() < 1e-15
+    assert norm(SOLID.visible(u, v)) == pytest.approx(1, abs=1e-7)
+
+
+def test_microfacets_at_the_ends_of_the_disk_come_back_though_they_stick_out_by_rounding():
+    """x = 1 or -1 and y = 0, where 1 - x^2 is 0 but for rounding."""
+    v = views(3, 4000, np.random.default_rng(8))
+    u = np.stack([np.arange(4000) % 2, np.full(4000, 0.5)])
+    m = SOLID.visible(u, v)
+    assert ((m * m).sum(axis=0) > 1).any()
+    assert SOLID.unvisible(m, v) == pytest.approx(u, abs=1e-6)
+
+
+def test_the_middle_of_the_square_is_the_middle_of_the_disk():
+    assert (SOLID.ball(np.full((2, 1), 0.5)) == 0).all()
+    assert SOLID.unball(np.zeros((2, 1))) == pytest.approx(0.5, abs=1e-12)
