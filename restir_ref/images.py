@@ -105,9 +105,14 @@ def _rings(steps: Array, count: int) -> list[Array]:
 
 def _first_alike(alike: Alike, of: Image, index: Array, tried: Sequence[Pixels]) -> Pixels:
     """The first of the neighbours tried that sees alike, else the pixel itself."""
-    found = index
-    for near in reversed(tried):
-        found = np.where(alike(index % of.n, near.index % of.n), near.index, found)
+    found, left = index.copy(), np.arange(len(index))
+    for near in tried:
+        there = near.index.take(left)
+        like = alike(index.take(left) % of.n, there % of.n)
+        found[left[like]] = there[like]
+        left = left[~like]
+        if not len(left):
+            break
     return Pixels(of, found)
 
 
