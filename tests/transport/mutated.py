@@ -78,7 +78,7 @@ def retraced_far(t: Tracer, u: Array, i: Array, x: Path) -> tuple[FarPath, Path]
 
 
 def retraced_acceptance(m: Moves) -> Array:
-    """p_hat(x') / p_hat(x) T from the densities of paths traced from scratch, none of which `mutations` has computed."""
+    """p_hat(x') / p_hat(x) T from densities of paths traced from scratch, none of which `mutations` has computed."""
     (a, far_a), (b, far_b) = (retraced_far(m.t, own(m.t, x, m.i), m.i, x) for x in (m.x, m.x_new))
     joined = (m.x.c <= m.x.k) & ~(m.x.nee & (m.x.c == m.x.k))
     return b.F.mean(axis=0) / a.F.mean(axis=0) * np.where(joined, ratio(far_b.A, far_a.A), 1)

@@ -251,7 +251,7 @@ def test_proposals_that_would_are_noticed(monkeypatch) -> None:
     of = TwoRays(tracer("glossy_cornell"), ByNumbers(0.3))
     X, here = reused(of, 6, seed=1)
     m = moves(of, X, here, seed=2)
-    y, J = shift_path(m.t, m.x_new, m.i)
+    _, J = shift_path(m.t, m.x_new, m.i)
     assert (traced(m.t, own(m.t, m.x_new, m.i), m.i, m.x.k, m.x.nee).c != m.x.c).mean() > 0.01
     assert (J == 0).mean() > 0.01  # not even the shift to its own pixel is defined
 
@@ -310,7 +310,7 @@ def rays_per_proposal(of_tracer: Callable[[Tracer], PathIntegrals], scene: str) 
     t = tracer(scene)
     of = of_tracer(replace(t, scene=counted(t.scene, asked)))
     X, here = reused(of, 4, seed=1)
-    movable = ((X.x.c > 0) & (X.W > 0)).sum()
+    movable = (X.W > 0).sum() if hasattr(of, "numbers") else ((X.x.c > 0) & (X.W > 0)).sum()
     found = []
     for k in (1, 10):
         asked.clear()
@@ -336,8 +336,8 @@ def test_retracing_costs_the_rays_of_a_tree_and_more() -> None:
 # ---------------------------------------------------------------- bad input
 
 BAD_SIGMA = {
-    "numbers": lambda sigma: ByNumbers(sigma),
-    "directions": lambda sigma: ByDirections(sigma),
+    "numbers": ByNumbers,
+    "directions": ByDirections,
     "retraced": lambda sigma: Retraced(tracer("cornell"), sigma),
 }
 
@@ -345,12 +345,12 @@ BAD_SIGMA = {
 @pytest.mark.parametrize("make", BAD_SIGMA.values(), ids=BAD_SIGMA)
 @pytest.mark.parametrize("sigma", [0, -0.1, np.nan, "wide"])
 def test_a_step_without_length_is_refused(make, sigma) -> None:
-    with pytest.raises(ValueError, match="sigma must be one positive number.*k = 0"):
+    with pytest.raises(ValueError, match=r"sigma must be one positive number.*k = 0"):
         make(sigma)
 
 
 def test_the_far_part_survives_reuse_and_is_that_of_the_path_as_it_stands() -> None:
-    t, x, i = after_reuse("glossy_cornell")
+    t, x, i = after_reuse("ajar")
     onward = np.flatnonzero((x.c > 0) & (x.c < x.k))
     x, i = take(x, onward), i[onward]
     near, _ = retraced_far(t, own(t, x, i), i, x)
