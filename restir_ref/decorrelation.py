@@ -208,3 +208,17 @@ class Blue:
         pairs = zip(self.neighbours, self.distances, strict=True)
         terms = [energy(distance, luminance - self.luminance[near]) for near, distance in pairs]
         return total(terms) / len(terms)
+
+
+Near = Callable[[Pixels, Chance], tuple[Sequence[Array], Sequence[Array | float]]]
+"""Chooses neighbours: columns (N,) of each, and how far away they are, in pixels."""
+
+
+def blue(w: float, near: Near, temperature: float = 0.01) -> Rule:
+    """The rule of a pass that prefers blue noise, with the luminances that enter it.  [MCMC 4.2, Alg. 6]"""
+
+    def rule(X: Reservoirs, here: Pixels, chance: Chance) -> Acceptance:
+        columns, distances = near(here, chance)
+        return Blue(weighted(here, X.x, X.W).mean(axis=0), columns, distances, w, temperature)
+
+    return rule
