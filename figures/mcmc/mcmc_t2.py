@@ -207,12 +207,7 @@ def ways(axis: "Axes", a: Arrays) -> None:
         middle = np.array([one.mean() / none.mean() for one, none in found])
         low, high = np.array([criteria.ratio_interval(*each)[:2] for each in found]).T
         place = [views.index(view) + 0.27 * (n - 1) for view in shown_]
-        look: dict[str, Any] = {
-            "color": style.COLOURS[n],
-            "hatch": style.HATCHES[n],
-            "edgecolor": style.PAPER,
-            "label": name,
-        }
+        look: dict[str, Any] = {"color": style.COLOURS[n + 4], "hatch": style.HATCHES[n], "edgecolor": style.PAPER}
         axis.bar(place, middle, 0.25, yerr=[middle - low, high - middle], error_kw={"lw": 0.8}, label=name, **look)
     axis.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="no mutations")
     axis.set_xticks(range(len(views)), [view.replace(", ", ",\n").replace("whole film", "film") for view in views])
