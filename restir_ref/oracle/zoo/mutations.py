@@ -141,8 +141,8 @@ MUTATION_BUGS = (
     ),
     Bug(
         "transition ratio upside down",
-        "T(u -> u') over T(u' -> u): primes are easily lost on the way from the derivation to the code.",
-        "as if the ratio were left out, twice as strong",
+        "The code has T(u -> u') over T(u' -> u): primes are easily lost between derivation and code.",
+        "bright or dark where the moved vertex comes near to what it is joined to, and stronger than without the ratio",
         "[MCMC 3.2.1, 4.1]",
         reference_scene,
         right=UNEVEN,
