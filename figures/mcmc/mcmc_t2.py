@@ -79,10 +79,10 @@ def pair(a: Arrays, view: str, arms: tuple[str, str], what: str) -> tuple[Array,
 
 
 def compared(id_: str, found: tuple[Array, Array] | None, limit: float, part: str, reason: str = "") -> Claim:
-    """The first arm below `limit` times the second, the opposite beside it."""
+    """The first arm below `limit` times the second; the opposite is that it is above the second."""
     if found is None:
         return Claim(id_, None, part, reason=QUICK)
-    return Claim(id_, criteria.ratio_below(*found, limit), part, criteria.ratio_above(*found, limit), reason=reason)
+    return Claim(id_, criteria.ratio_below(*found, limit), part, criteria.ratio_above(*found, 1), reason=reason)
 
 
 QUICK = "Few images of short chains, or none: judged by the paper preset."
@@ -100,7 +100,13 @@ def check(a: Arrays) -> list[Claim]:
     claims += [driven(a, view, k) for view in JUDGED for k in KS[1:]]
     claims += [like_plain(a, view) for view in JUDGED]
     claims += [
-        compared("MCMC-C03", pair(a, view, (FIVE, AFTER), "covariance"), 0.95, f"{view}: covariance between / after")
+        compared(
+            "MCMC-C03",
+            pair(a, view, (FIVE, AFTER), "covariance"),
+            0.95,
+            f"{view}: covariance between / after",
+            EITHER_WAY,
+        )
         for view in (FILM, SLIT)
     ]
     return [*claims, *(less_behind_the_slit(a, view) for view in (FILM, SLIT))]
@@ -118,11 +124,9 @@ def driven(a: Arrays, view: str, k: str) -> Claim:
     error, covariance = (pair(a, view, (k, NONE), what) for what in ("error", "covariance"))
     if error is None or covariance is None:
         return Claim("MCMC-C01", None, part, reason=QUICK)
+    outcome = criteria.all_of(*(criteria.ratio_below(*each, 1.03) for each in (error, covariance)))
     return Claim(
-        "MCMC-C01",
-        criteria.all_of(*(criteria.ratio_below(*each, 1.03) for each in (error, covariance))),
-        part,
-        criteria.ratio_above(*error, 1.03),
+        "MCMC-C01", outcome, part, criteria.ratio_above(*error, 1.03), reason="" if outcome.passed else NO_RISE
     )
 
 
@@ -149,12 +153,20 @@ def less_behind_the_slit(a: Arrays, view: str) -> Claim:
     return Claim("MCMC-C04", criteria.Outcome(text, rule, passed), part, counter)
 
 
-WHY: dict[str, str] = {}
+WHY: dict[str, str] = {
+    FILM: "It falls, but 400 images cannot tell 0.88 from 0.9: behind the slit a few rare paths carry most of it.",
+    SLIT: "It falls, but not by 10% for certain: pixels here agree about paths, and a mutation keeps what they agree on.",
+}
+NO_RISE = "No increase is seen, but so many images cannot exclude one of 3%."
+EITHER_WAY = (
+    "Our explanation: what is mutated after spatial reuse is what the next frame reuses in time, so that samples differ "
+    "before the next spatial reuse either way."
+)
 
 
 def draw(a: Arrays) -> "Picture":
     """Covariance and RMSE over k relative to k = 0, and covariances of other ways to mutate."""
-    picture, axes = style.panels(1, 3, width=3.9, height=3.6)
+    picture, axes = style.panels(1, 3, width=3.9, height=4.0)
     for axis, what, title in (
         (axes[0, 0], "covariance", f"Covariance, radius {RADIUS}"),
         (axes[0, 1], "error", "RMSE"),
@@ -212,7 +224,7 @@ def ways(axis: "Axes", a: Arrays) -> None:
     axis.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="no mutations")
     axis.set_xticks(range(len(views)), [view.replace(", ", ",\n").replace("whole film", "film") for view in views])
     axis.grid(visible=False, axis="x")
-    axis.set(ylabel="covariance relative to $k$ = 0 (bars: 95%)", title="Five mutations, three ways")
+    axis.set(yscale="log", ylabel="relative to $k$ = 0 (bars: 95%)", title="Covariance, five mutations in three ways")
     style.below(axis, ncols=1)
 
 
