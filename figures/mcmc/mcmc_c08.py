@@ -7,7 +7,7 @@ p_hat W = 1 and all noise to the contribution.  Either way W takes up exp(E / T)
 temperatures than these means are carried by samples too rare to be met.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
@@ -22,7 +22,7 @@ from figures.report import style
 from restir_ref.batch import Array, total, where
 from restir_ref.chance import Chance, Live
 from restir_ref.decorrelation import energy, mutate
-from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.integrals import Pixels, Reservoirs, Shifted
 from restir_ref.metrics import low_frequency_ratio
 from restir_ref.restir import initial, shade
 from toy1d import image_of_64, walking
@@ -67,6 +67,14 @@ class Tempered:
     def n(self) -> int:
         """Number of pixels."""
         return self.line.n
+
+    def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Array, Array]]:
+        """Those of the line."""
+        return self.line.candidates(index, chance)
+
+    def shift(self, x: Array, index: Array, to: Pixels) -> Shifted:
+        """That of the line."""
+        return self.line.shift(x, index, to)
 
     def target(self, index: Array, x: Array) -> Array:
         """pi; at an infinite temperature p_hat or 1."""

@@ -74,7 +74,8 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
 
     Of rows also estimates' ratio and mean squared error before and after reuse.
     """
-    kind, found = KINDS[chunk["kind"]], {}
+    kind = KINDS[chunk["kind"]]
+    found: Arrays = {}
     white = masks.white(kind.shape, preset["masks"], rng)
     for noise, mask in zip(NOISES, (white, masks.swapped(white, kind, rng)), strict=True):
         errors = (mask - 0.5).reshape(-1, *kind.shape)

@@ -155,12 +155,12 @@ def less_behind_the_slit(a: Arrays, view: str) -> Claim:
 
 WHY: dict[str, str] = {
     FILM: "It falls, but 400 images cannot tell 0.88 from 0.9: behind the slit a few rare paths carry most of it.",
-    SLIT: "It falls, but not by 10% for certain: pixels here agree about paths, and a mutation keeps what they agree on.",
+    SLIT: "It falls, but not by 10% for certain: pixels agree about paths, and a mutation keeps what they agree on.",
 }
-NO_RISE = "No increase is seen, but so many images cannot exclude one of 3%."
+NO_RISE = "No certain increase, but so many images cannot exclude one of 3%."
 EITHER_WAY = (
-    "Our explanation: what is mutated after spatial reuse is what the next frame reuses in time, so that samples differ "
-    "before the next spatial reuse either way."
+    "Our explanation: what is mutated after spatial reuse is what the next frame reuses in time, so that samples "
+    "differ before the next spatial reuse either way."
 )
 
 
@@ -228,8 +228,8 @@ def ways(axis: "Axes", a: Arrays) -> None:
     style.below(axis, ncols=1)
 
 
-FEW = {NONE: 2, "k = 1": 1, FIVE: 2, "k = 20": 1, BLUE: 1, AFTER: 1}
-MANY = {NONE: 4, "k = 1": 2, FIVE: 4, "k = 20": 2, BLUE: 2, AFTER: 4}
+FEW = {NONE: 2, "k = 1": 2, FIVE: 2, "k = 20": 1, BLUE: 1, AFTER: 1}
+MANY = {NONE: 4, "k = 1": 4, FIVE: 4, "k = 20": 2, BLUE: 2, AFTER: 4}
 """Parts of the images by arm: behind the slit a few rare paths carry most of a covariance."""
 
 FIGURE = Figure(
