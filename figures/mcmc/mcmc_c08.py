@@ -163,12 +163,12 @@ def draw(a: Arrays) -> "Picture":
         low, square = a[f"{name}.after.low"].mean(axis=1), a[f"{name}.after.square"].mean(axis=1)
         look = style.nth(number, label=name, markevery=1)
         axes[0, 0].semilogx(TEMPERATURES, low, **look)
-        axes[0, 1].loglog(TEMPERATURES, square / a[f"{name}.before.square"].mean(), **look)
+        axes[0, 1].semilogx(TEMPERATURES, square / a[f"{name}.before.square"].mean(), **look)
     for axis in axes[0]:
         axis.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="white noise, no mutations")
         axis.set_xlabel("temperature $T$")
-    axes[0, 0].set(ylabel="low-frequency ratio of the error", title="How blue it gets", ylim=(0, 1.6))
-    axes[0, 1].set(ylabel="variance / without mutations", title="What it costs")
+    axes[0, 0].set(ylabel="low-frequency ratio", title="How blue the error gets", ylim=(0, 1.6))
+    axes[0, 1].set(ylabel="variance / without mutations", title="What it costs", ylim=(0, 1.6))
     style.below(axes[0, 0], ncols=1)
     style.below(axes[0, 1], ncols=1)
     return picture
