@@ -5,9 +5,12 @@ An image is the last frame of a chain of its own; nothing is averaged over frame
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter
 
 from figures.experiments.references import reference
 from figures.experiments.views import HYBRID, at_random
@@ -16,8 +19,9 @@ from flatland2d.sensors import FILM, Pinhole
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
 from restir_ref.decorrelation import Move, Mutation, blue, metropolis, mutations, ready
+from restir_ref.images import random_in_disk
 from restir_ref.integrals import Image, Pixels, Reservoirs, target
-from restir_ref.loop import REAL_TIME, WHOLE, frame, random_in_row
+from restir_ref.loop import REAL_TIME, WHOLE, Preset, frame, random_in_row
 from restir_ref.metrics import rmse
 from restir_ref.restir import shade
 from restir_ref.transport.paths import Tracer
@@ -73,11 +77,15 @@ VIEWS: Mapping[str, View] = MappingProxyType(
 )
 
 
-def near_in_row(here: Pixels, chance: Chance) -> tuple[Sequence[Array], Sequence[Array | float]]:
-    """Neighbours for the energy of blue noise."""
-    image: Image = here.of  # type: ignore[assignment]
-    around = random_in_row(image, here.index, BLUE_NEIGHBOURS, BLUE_RADIUS, chance)
-    return [each.index for each in around], [np.abs(each.index - here.index) for each in around]
+def near_by(here: Pixels, chance: Chance) -> tuple[Sequence[Array], Sequence[Array | float]]:
+    """Neighbours for the energy of blue noise, in a row or in a plane."""
+    image: Any = here.of
+    shape: Any = getattr(image, "shape", (image.n,))
+    place = np.stack(np.unravel_index(here.index % image.n, shape))
+    choose = random_in_row if len(shape) == 1 else random_in_disk(shape)
+    around = [each.index for each in choose(image, here.index, BLUE_NEIGHBOURS, BLUE_RADIUS, chance)]
+    apart = [np.stack(np.unravel_index(each % image.n, shape)) - place for each in around]
+    return around, [np.sqrt((each**2).sum(axis=0)) for each in apart]
 
 
 @dataclass(frozen=True)
@@ -92,18 +100,20 @@ NONE = mutations(0)
 ARMS: Mapping[str, Arm] = MappingProxyType(
     {
         **{f"k = {k}": Arm(mutations(k), NONE) for k in (0, 1, 2, 5, 20, 50)},
-        "k = 5, blue": Arm(mutations(5, blue(BLUE_WEIGHT, near_in_row)), NONE),
+        "k = 5, blue": Arm(mutations(5, blue(BLUE_WEIGHT, near_by)), NONE),
         "k = 5, after spatial reuse": Arm(NONE, mutations(5)),
     }
 )
 
 
-def chain(of: Image, arm: Arm, frames: int, replicas: int, chance: Chance) -> tuple[Reservoirs, Pixels]:
+def chain(
+    of: Image, arm: Arm, frames: int, replicas: int, chance: Chance, *, loop: Preset = LOOP
+) -> tuple[Reservoirs, Pixels]:
     """The reservoirs after the last frame of a still camera's chain."""
     here, passes = Pixels(of, np.arange(replicas * of.n)), replace(WHOLE, mutation=arm.between)
-    X = arm.after(frame(here, chance, LOOP, at_random, passes=passes), here, chance)
+    X = arm.after(frame(here, chance, loop, at_random, passes=passes), here, chance)
     for _ in range(frames - 1):
-        X = arm.after(frame(here, chance, LOOP, at_random, X, [here], passes=passes), here, chance)
+        X = arm.after(frame(here, chance, loop, at_random, X, [here], passes=passes), here, chance)
     return X, here
 
 
@@ -135,6 +145,14 @@ def covariances(images: Array, radius: int = RADIUS) -> Array:
     box = ((near <= radius) & (near > 0)).astype(float)
     per_pixel = ratio(d @ box, np.broadcast_to(box.sum(axis=0), d.shape))
     return np.asarray((d * per_pixel).mean(axis=1) * len(images) / (len(images) - 1))
+
+
+def covariances_of_map(images: Array, reach: tuple[int, int] = (RADIUS, RADIUS)) -> Array:
+    """The same of maps, (K, rows, columns) -> (K,), with pixels so far away in rows and in columns."""
+    size = (1, *(2 * each + 1 for each in reach))
+    d = images - images.mean(axis=0)
+    box, others = (uniform_filter(each, size, mode="constant") * prod(size) for each in (d, np.ones_like(d)))
+    return np.asarray((d * ratio(box - d, np.round(others - 1))).mean(axis=(1, 2)) * len(d) / (len(d) - 1))
 
 
 def errors(images: Array, truth: Array) -> Array:

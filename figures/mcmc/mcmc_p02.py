@@ -12,7 +12,7 @@ import numpy as np
 
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
-from figures.experiments.mutated import ARMS, BLUE_WEIGHT, ENOUGH, VIEWS, chain, near_in_row, shown
+from figures.experiments.mutated import ARMS, BLUE_WEIGHT, ENOUGH, VIEWS, chain, near_by, shown
 from figures.report import style
 from restir_ref.batch import Array, ratio
 from restir_ref.chance import Live
@@ -49,7 +49,7 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
 def kept(X: Reservoirs, here: Pixels, chance: Live) -> Arrays:
     """Largest relative change of a lit pixel after 1, 5, 50 mutations, and largest |e' - e| of any proposal."""
     before, changes, energies = shown(X, here), [], [0.0]
-    noise = Blue(before.reshape(-1), *near_in_row(here, chance), BLUE_WEIGHT)
+    noise = Blue(before.reshape(-1), *near_by(here, chance), BLUE_WEIGHT)
 
     def watched(move: Move) -> Array:
         e, e_new = noise.energies(move)
