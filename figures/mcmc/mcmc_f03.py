@@ -122,13 +122,15 @@ def check(a: Arrays) -> list[Claim]:
             ),
         ]
     before, after = ([a[f"row.{noise}.{when}.ratio"].mean() for noise in NOISES] for when in ("before", "after"))
+    blue = a["row.blue.after.ratio"]
+    error_of_blue = f"The blue mean has a standard error of {blue.std(ddof=1) / np.sqrt(len(blue)):.3f}."
     error = [a[f"row.{noise}.after.error"] for noise in NOISES]
     low = [a[f"row.{noise}.after.error"] * a[f"row.{noise}.after.ratio"] for noise in NOISES]
     undone = criteria.all_of(criteria.below(before[1], 0.2), criteria.above(after[1], 0.5))
     reddened = criteria.all_of(criteria.between(before[0], 0.8, 1.2), criteria.above(after[0], 1.3))
     return [
         *claims,
-        Claim("MCMC-C05", undone, "blue: low-frequency ratio before and after reuse"),
+        Claim("MCMC-C05", undone, "blue: low-frequency ratio before and after reuse", reason=error_of_blue),
         Claim("MCMC-C05", reddened, "white: low-frequency ratio before and after reuse"),
         Claim("MCMC-C06", criteria.ratio_below(error[1], error[0], 0.9), "variance after reuse, blue / white"),
         Claim("MCMC-C06", criteria.ratio_below(low[1], low[0], 1), "low-frequency power after reuse, blue / white"),

@@ -71,7 +71,10 @@ def check(a: Arrays) -> list[Claim]:
     claims = [
         ratio(a, "MCMC-T2", (FIVE, NONE, "covariance"), 0.9, "64 pixels: covariance 5 / 0"),
         ratio(a, "MCMC-T1", (FIVE, NONE, "error"), 1.03, "64 pixels: RMSE 5 / 0"),
-        ratio(a, "MCMC-C03", (FIVE, AFTER, "covariance"), 0.95, "64 pixels: covariance between / after"),
+        replace(
+            ratio(a, "MCMC-C03", (FIVE, AFTER, "covariance"), 0.95, "64 pixels: covariance between / after"),
+            reason=EITHER_WAY,
+        ),
     ]
     correlated = ", ".join(f"{a[f'{arm}.correlation'][0]:.3f} ({NAMES[arm]})" for arm in (NONE, FIVE))
     claims.append(Claim("MCMC-T2", criteria.reported(correlated), "64 pixels: correlation coefficient"))
@@ -88,11 +91,17 @@ def check(a: Arrays) -> list[Claim]:
     return claims
 
 
+EITHER_WAY = (
+    "Our explanation: what is mutated after spatial reuse is what the next frame reuses in time, so that samples "
+    "differ before the next spatial reuse either way."
+)
+
+
 def ratio(a: Arrays, id_: str, of: tuple[str, str, str], limit: float, part: str) -> Claim:
     """One arm below `limit` times the other."""
     one, other, what = of
     pair = a[f"{one}.{what}"], a[f"{other}.{what}"]
-    return judged(a, Claim(id_, criteria.ratio_below(*pair, limit), part, criteria.ratio_above(*pair, limit)))
+    return judged(a, Claim(id_, criteria.ratio_below(*pair, limit), part, criteria.ratio_above(*pair, 1)))
 
 
 def judged(a: Arrays, claim: Claim) -> Claim:
