@@ -282,8 +282,45 @@ def positivized(mine: Parts, count: int = 1000) -> str:
 ROUNDING = 1e-12
 
 
+# ---------------------------------------------------------------- 08: one mutation
+
+Step = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
+
+
+def mutation(mine: Step, K: int = 6) -> str:
+    """Whether mine(p_hat, p_hat_new, T, W) -> (a, W') keeps p_hat on K cells and W unbiased.  [MCMC 3.2]
+
+    T is T(x' -> x) / T(x -> x') of proposals that are not symmetric.
+    """
+    rng = np.random.default_rng(SEED)
+    p, T = 0.1 + rng.random(K), rng.random((K, K))
+    x, y = (each.reshape(-1) for each in np.indices((K, K)))
+    a, W = columns(mine(p[x], p[y], T[y, x] / T[x, y], np.full(K * K, 2.0)), K * K, "a and W'")
+    flow = p[x] * T[x, y] * np.where((a >= 0) & (a <= 1), a, np.nan)
+    back = flow.reshape(K, K).T.reshape(-1)
+    off = np.abs(flow - back)[x != y].max()
+    if not off < 1e-12:
+        return not_yet("what goes from x to x' does not come back: p_hat(x) T(x -> x') a(x -> x') must be symmetric.")
+    if not a.max() > 0:
+        return not_yet("nothing is ever accepted.")
+    if not np.allclose(p[y] * W, 2 * p[x], rtol=1e-12):
+        return not_yet("p_hat(x') W' is not p_hat(x) W, so that E[f(X') W'] is no longer the integral of f.")
+    return right("p_hat is kept, and so is what the pixel itself shows.")
+
+
 CHECKS: Mapping[str, Callable[[Any], str]] = {
     check.__name__: check
-    for check in (ris, gris_pass, weight, all_outcomes, jacobian, careful_shift, film, motion_vector, positivized)
+    for check in (
+        ris,
+        gris_pass,
+        weight,
+        all_outcomes,
+        jacobian,
+        careful_shift,
+        film,
+        motion_vector,
+        positivized,
+        mutation,
+    )
 }
 """All checks by name."""

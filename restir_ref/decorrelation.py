@@ -1,7 +1,10 @@
 """Metropolis-Hastings mutations between temporal and spatial reuse decorrelate neighbours.  [MCMC 3.2, 4.2]
 
 Integrals that can be mutated have one more method,
-`propose(index, x, chance) -> (x', T(x' -> x) / T(x -> x'))`.
+`propose(index, x, chance) -> (x', T(x' -> x) / T(x -> x'))`.  Those whose proposals need something of x that no
+mutation changes have another, `standing(X, index)`: integrals that know it, for the mutations of one pass.
+
+    passes = replace(WHOLE, mutation=mutations(5))     a frame with five mutations per pixel, see `loop.frame`
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +17,7 @@ from scipy.special import ndtri
 
 from restir_ref.batch import Array, ratio, total, where
 from restir_ref.chance import Chance
-from restir_ref.guards import apart, nonnegative, read_only
+from restir_ref.guards import apart, nonnegative, positive, read_only, whole
 from restir_ref.integrals import Integrals, Pixels, Reservoirs, Sample, target, weighted
 
 
@@ -59,19 +62,68 @@ def mutate(X: Reservoirs, here: Pixels, chance: Chance, acceptance: Acceptance =
 def attempt(X: Reservoirs, here: Pixels, chance: Chance, acceptance: Acceptance) -> tuple[Reservoirs, Array]:
     """Propose x'; where accepted, X <- x' and W <- W p_hat(x) / p_hat(x'): p_hat W stays.  [MCMC 3.2.4]
 
-    Returns the reservoirs and where the proposal was accepted (N,).
+    Null samples, W = 0, stay where they are.  Returns the reservoirs and where the proposal was accepted (N,).
     """
     # erratum: the prose of 5.2.4 turns the ratio of W upside down, unlike 3.2.4 and Alg. 6; and Alg. 3
     # forgets all accepted moves if the last proposal is rejected.
-    of: Mutable = here.of  # type: ignore[assignment]
+    of: Mutable = mutable(here.of)
     x_new, T_ratio = of.propose(here.index, read_only(X.x), chance)
     nonnegative(T_ratio, "the ratio T(x' -> x) / T(x -> x')", "Return 0 for an invalid proposal from propose().")
     move = Move(here, X, x_new, target(here, X.x), target(here, x_new), T_ratio)
     apart(move.p_hat, move.p_hat_new, "results of target()")
-    a = np.where(move.p_hat_new > 0, acceptance(move), 0)
+    a = np.where((move.p_hat_new > 0) & (X.W > 0), acceptance(move), 0)
     accepted = chance.choose(np.stack([1 - a, a])) == 1
     W_new = X.W * ratio(move.p_hat, np.where(accepted, move.p_hat_new, 1))
     return Reservoirs(where(accepted, x_new, X.x), np.where(accepted, W_new, X.W), X.c), accepted
+
+
+def mutable(of: Integrals) -> Mutable:
+    """The integrals, if they can propose; raises TypeError, naming them, if they cannot."""
+    if not hasattr(of, "propose"):
+        raise TypeError(
+            f"{type(of).__name__} has no propose(index, x, chance), so that its samples cannot be mutated: give it "
+            "one, take integrals that have it (of paths `transport.mutations`, of lines `toy1d.walking`), or k = 0."
+        )
+    return of  # type: ignore[return-value]
+
+
+# ---------------------------------------------------------------- the pass
+
+Mutation = Callable[[Reservoirs, Pixels, Chance], Reservoirs]
+"""A pass that changes the samples of reservoirs."""
+
+Rule = Callable[[Reservoirs, Pixels, Chance], Acceptance]
+"""How the proposals of a pass are accepted, given the reservoirs that enter it."""
+
+
+def by_target(X: Reservoirs, here: Pixels, chance: Chance) -> Acceptance:
+    """Metropolis and Hastings for p_hat, whatever enters."""
+    return metropolis
+
+
+def mutations(k: int, rule: Rule = by_target) -> Mutation:
+    """The decorrelation pass: k mutations of every reservoir, one after the other.  [MCMC 3.2.4, Alg. 3]
+
+    Raises ValueError for k that is no whole number >= 0, and the pass TypeError for integrals that cannot propose.
+    """
+    whole(k, 0, "the number k of mutations", "It counts proposals per pixel and frame; 0 leaves the pass out.")
+
+    def walk(X: Reservoirs, here: Pixels, chance: Chance) -> Reservoirs:
+        if k == 0:
+            return X
+        mutable(here.of)
+        acceptance, there = rule(X, here, chance), ready(X, here)
+        for _ in range(k):
+            X = mutate(X, there, chance, acceptance)
+        return X
+
+    return walk
+
+
+def ready(X: Reservoirs, here: Pixels) -> Pixels:
+    """`here`, as integrals that know what the mutations of X have in common, where there are such."""
+    standing = getattr(here.of, "standing", None)
+    return here if standing is None else Pixels(standing(X, here.index), here.index)
 
 
 # ---------------------------------------------------------------- steps of primary sample numbers
@@ -118,7 +170,8 @@ class Blue:
     """The acceptance a = min(1, (w_bn a_bn + (1 - w_bn) p_hat(x') / p_hat(x)) T(x' -> x) / T(x -> x')).  [MCMC 4.2]
 
     luminance (N,) is that of the columns before the mutations; `neighbours` are arrays (N,) of columns,
-    `distances` their distances in pixels.
+    `distances` their distances in pixels, one each or (N,).  Raises ValueError for w outside of [0, 1], or a
+    temperature <= 0.
 
     # erratum: [MCMC 4.2] says that keeping T outside the weighted average guarantees detailed balance;
     # it does not for any w_bn > 0.  It prints no min(1, .) either, see `metropolis`.
@@ -128,9 +181,16 @@ class Blue:
 
     luminance: Array
     neighbours: Sequence[Array]
-    distances: Sequence[float]
+    distances: Sequence[Array | float]
     w: float
     temperature: float = 0.01
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.w <= 1:
+            raise ValueError(
+                f"the weight w of blue noise must be in [0, 1], but is {self.w}: 0 leaves it out, 1 p_hat."
+            )
+        positive(self.temperature, "the temperature of blue noise", "small ones accept little that makes noise redder.")
 
     def __call__(self, move: Move) -> Array:
         """a (N,)."""
@@ -148,3 +208,17 @@ class Blue:
         pairs = zip(self.neighbours, self.distances, strict=True)
         terms = [energy(distance, luminance - self.luminance[near]) for near, distance in pairs]
         return total(terms) / len(terms)
+
+
+Near = Callable[[Pixels, Chance], tuple[Sequence[Array], Sequence[Array | float]]]
+"""Chooses neighbours: columns (N,) of each, and how far away they are, in pixels."""
+
+
+def blue(w: float, near: Near, temperature: float = 0.01) -> Rule:
+    """The rule of a pass that prefers blue noise, with the luminances that enter it.  [MCMC 4.2, Alg. 6]"""
+
+    def rule(X: Reservoirs, here: Pixels, chance: Chance) -> Acceptance:
+        columns, distances = near(here, chance)
+        return Blue(weighted(here, X.x, X.W).mean(axis=0), columns, distances, w, temperature)
+
+    return rule

@@ -35,13 +35,22 @@ OFFLINE = Preset(trees=32, rounds=3, neighbours=6, radius=10, cap=np.nan)
 """32 path trees resampled to one, 3 rounds with 6 neighbours within 10 pixels; no temporal reuse, so no cap."""
 
 
+def unmutated(X: Reservoirs, here: Pixels, chance: Chance) -> Reservoirs:
+    """Samples as they are."""
+    return X
+
+
 @dataclass(frozen=True)
 class Passes:
-    """Who runs the passes of a frame: `restir` itself, or the same over windows of columns (`windows`)."""
+    """Who runs the passes of a frame: `restir` itself, or the same over windows of columns (`windows`).
+
+    mutation(X, here, chance)  changes samples between temporal and spatial reuse (`decorrelation.mutations`)
+    """
 
     initial: Callable[..., Reservoirs]
     temporal: Callable[..., Reservoirs]
     spatial: Callable[..., Reservoirs]
+    mutation: Callable[[Reservoirs, Pixels, Chance], Reservoirs] = unmutated
 
 
 WHOLE = Passes(initial, temporal, spatial)
@@ -61,7 +70,7 @@ def frame(
     *,
     passes: Passes = WHOLE,
 ) -> Reservoirs:
-    """One frame: initial samples, temporal reuse if there is history, rounds of spatial reuse.
+    """One frame: initial samples, temporal reuse if there is history, mutations, rounds of spatial reuse.
 
     history are the previous frame's reservoirs, `before` the columns of it that motion vectors
     name, in the previous frame's integrals.
@@ -70,6 +79,7 @@ def frame(
     if history is not None:
         along = named(WEIGHTS, preset.along, "MIS weight")
         X = passes.temporal(X, here, history, before, chance, mis=along, cap=preset.cap)
+    X = passes.mutation(X, here, chance)
     for _ in range(preset.rounds):
         image: Image = here.of  # type: ignore[assignment]
         near = around(image, here.index, preset.neighbours, preset.radius, chance)

@@ -10,6 +10,7 @@ from benchmarks.jobs import (
     gradients,
     indirect_references,
     means,
+    mutations,
     offline,
     probes,
     references,
@@ -35,6 +36,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "offline": offline.JOB,
         "probes": probes.JOB,
         "gradients": gradients.JOB,
+        "mutations": mutations.JOB,
         "witness": witness.JOB,
     }
 )

@@ -129,6 +129,11 @@ def without_T(move: Move) -> Array:
     return metropolis(replace(move, T_ratio=np.where(move.T_ratio > 0, 1, 0)))
 
 
+def upside_down(move: Move) -> Array:
+    """a = min(1, p_hat(x') T(x -> x') / (p_hat(x) T(x' -> x))): the ratio of transitions turned round."""
+    return metropolis(replace(move, T_ratio=ratio(np.ones(len(move.T_ratio)), move.T_ratio)))
+
+
 def unsymmetric(X: Reservoirs, here: Pixels, chance: Chance) -> Reservoirs:
     """A mutation that takes its proposals for symmetric."""
     return mutate(X, here, chance, without_T)

@@ -49,7 +49,12 @@ def first_connectable(t: Tracer, tree: Tree) -> tuple[Array, Array]:
 def record(t: Tracer, tree: Tree, k: Array, nee: Array, F: Array) -> Path:
     """The path record of leaf (k, nee) (N,) of each column, with contribution F (C, N)."""
     by_hit, by_light = first_connectable(t, tree)
-    c = np.where(nee, entry(by_light, k), entry(by_hit, k))
+    return record_from(t, tree, (k, nee), np.where(nee, entry(by_light, k), entry(by_hit, k)), F)
+
+
+def record_from(t: Tracer, tree: Tree, leaf: tuple[Array, Array], c: Array, F: Array) -> Path:
+    """The same with x_c to reconnect to, whether or not it is the first that can be; c (N,) is 0 or 2 .. depth + 1."""
+    k, nee = leaf
     s = stacks(tree)
     before = np.maximum(c - 1, 0)
     through = (c > 0) & (c <= k) & ~(nee & (c == k))

@@ -129,9 +129,9 @@ def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     P = mat.lobe_shares(table, y.v)
     local = space.to_local(y.v.n, w)
     weight, p, p_all = mat.scatter_lobe(table, space, y.v, P, x.lobe_in, local)
-    far = _roughness_of_z(t, x, z)
+    far = roughness_of_z(t, x, z)
     legal = y.legal & connectable(t.rule, mat.lobe_roughness(table, y.v, x.lobe_in), far, r) & (p > 0)
-    p_out, E = _beyond(t, x, z, p_all, r)
+    p_out, E = beyond(t, x, z, p_all, r)
     A = p * z.o[-1] / r ** (space.d - 1) * p_out
     legal &= (A > 0) & (np.minimum(np.abs(local[-1]), z.o[-1]) > GRAZING)
     asked = np.flatnonzero(legal)
@@ -139,14 +139,14 @@ def reconnect(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     return y.T * weight * E, A, legal
 
 
-def _roughness_of_z(t: Tracer, x: Path, z: Vertex) -> Array:
+def roughness_of_z(t: Tracer, x: Path, z: Vertex) -> Array:
     """Roughness that judges x_c: of its outgoing lobe, its roughest before light sampling, 1 on lights.  [GRIS 7.6]"""
     table = t.scene.materials
     by_lobe = np.where(x.nee & (x.c == x.k), mat.roughest(table, z), mat.lobe_roughness(table, z, x.lobe_out))
     return np.where(x.c > x.k, 1.0, by_lobe)
 
 
-def _beyond(t: Tracer, x: Path, z: Vertex, p_all_y: Array, r: Array) -> tuple[Array, Array]:
+def beyond(t: Tracer, x: Path, z: Vertex, p_all_y: Array, r: Array) -> tuple[Array, Array]:
     """Density of the direction leaving x_c (1 if none was sampled), and what arrives from there, (C, N).
 
     c < k: f / p at x_c times the suffix.  c = k: its MIS weight changes as well.  c = k + 1: the

@@ -87,6 +87,13 @@ WRONG = {
         "negative": ("np.maximum(d.mean(axis=0), 0) + some", "d.mean(axis=0) + some"),
         "lost where the mean is 0": ("0.1 * abs(d).mean(axis=0)", "0 * d[0]"),
     },
+    "mutation": {
+        "T forgotten": ("p_hat_new * T /", "p_hat_new /"),
+        "T upside down": ("p_hat_new * T /", "p_hat_new / T /"),
+        "no minimum": ("np.minimum(1, p_hat_new * T / p_hat)", "p_hat_new * T / p_hat"),
+        "W inverted": ("W * p_hat / p_hat_new", "W * p_hat_new / p_hat"),
+        "nothing moves": ("np.minimum(1,", "0 * np.minimum(1,"),
+    },
 }
 
 
@@ -106,6 +113,7 @@ NO_NUMBERS = {
     "jacobian": lambda x, y: np.nan * x.r,
     "motion_vector": lambda x, before: np.nan * x[0],
     "positivized": lambda d: (np.nan * d[0],) * 3,
+    "mutation": lambda p_hat, p_hat_new, T, W: (np.nan * T, W),
 }
 
 

@@ -49,8 +49,8 @@ def run(path):
 every_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 
 
-def test_there_are_seven_notebooks_in_order():
-    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_", "06_", "07_"]
+def test_there_are_eight_notebooks_in_order():
+    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_", "06_", "07_", "08_"]
 
 
 @every_notebook
@@ -135,3 +135,17 @@ def test_the_3d_tracer_in_ten_minutes_tells_the_truth():
     assert all(each.reused[0] < each.without[0] for each in found.values())
     assert "GRIS-F11b reproduced: " in printed
     assert "GRIS-F11b refuted: " in printed
+
+
+def test_why_blotches_dissolve_tells_the_truth():
+    names, printed = run(NOTEBOOKS[7])
+    glossy, slit = (
+        [[float(cell) for cell in row] for row in names["lesson"].sharing(scene).rows]
+        for scene in names["lesson"].SCENES
+    )
+    for (_, none, *_), _, (_, five, *_) in (glossy, slit):
+        assert five < 2 < none / 2
+    assert names["kept"].luminance < 1e-12
+    assert names["kept"].energy < 1e-7
+    assert names["kept"].moved > 0.1
+    assert "e' - e" in printed

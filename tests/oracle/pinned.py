@@ -52,6 +52,9 @@ WORST = {
     "only the last proposal updates": (-0.0547, 0.1062),
     "proposal clamped to the unit interval": (-0.5875, 0.75),
     "blue noise averaged into the acceptance": (-0.3142, 0.4078),
+    "transition ratio left out": (-0.3750, 0.7500),
+    "transition ratio upside down": (-0.7930, 1.6406),
+    "blue noise by the printed algorithm": (-0.2222, 0.5109),
 }
 """Smallest and largest relative bias over all cells of the bug's scene, enumerated."""
 
@@ -105,6 +108,9 @@ CAUGHT = {
     "only the last proposal updates": "D1pv",
     "proposal clamped to the unit interval": "D1pv",
     "blue noise averaged into the acceptance": "D1pv",
+    "transition ratio left out": "D1pv",
+    "transition ratio upside down": "D1pv",
+    "blue noise by the printed algorithm": "D1pv",
     "no Jacobian in any MIS weight": "vb",
     "flat proxy target in MIS": "vb",
     "1/Z weights": "vb",

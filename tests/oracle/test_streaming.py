@@ -54,7 +54,7 @@ def select_against_the_old_sum(candidates, chance, c) -> Reservoirs:
     return replace(select_streaming([stream.kept], chance, c), W=stream.w_sum / stream.kept.p_hat)
 
 
-@pytest.mark.claims("GRIS-A01")
+@pytest.mark.claims("GRIS-A01", "MCMC-A01")
 @given(w=WEIGHT_LISTS, data=st.data())
 def test_streaming_in_any_order_has_the_distribution_of_selecting_at_once(w, data) -> None:
     order = data.draw(st.permutations(range(len(w))))
@@ -62,7 +62,7 @@ def test_streaming_in_any_order_has_the_distribution_of_selecting_at_once(w, dat
     assert streamed == pytest.approx(at_once, abs=1e-13)
 
 
-@pytest.mark.claims("GRIS-A01")
+@pytest.mark.claims("GRIS-A01", "MCMC-A01")
 def test_comparing_with_the_old_sum_of_weights_is_caught() -> None:
     w = [1.0, 2.0, 3.0]
     right, wrong = (distribution(f, w, range(3)) for f in (select, select_against_the_old_sum))

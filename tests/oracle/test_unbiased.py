@@ -81,7 +81,7 @@ def test_the_oracle_says_exactly_one_in_rational_numbers(scene, cap) -> None:
     assert (bias == 0).all()
 
 
-@pytest.mark.claims("GRIS-C03", part="bias of 1/M")
+@pytest.mark.claims("GRIS-C03", "MCMC-C10", part="bias of 1/M")
 @given(scenes(n=2, K=4))
 def test_constant_weights_over_unequal_supports_are_biased_by_exactly_Z_over_M(scene: Scene) -> None:
     bias = bias_of(spatial_loop(scene, WEIGHTS["constant"], 1), scene.v, scene.support)
@@ -100,7 +100,7 @@ def realising(scene: Scene) -> Array:
     return Z
 
 
-@pytest.mark.claims("GRIS-C03", part="canonical inputs are unbiased")
+@pytest.mark.claims("GRIS-C03", "MCMC-C10", part="canonical inputs are unbiased")
 @given(st.data())
 def test_constant_weights_are_unbiased_where_all_inputs_are_canonical(data) -> None:
     """Same domain, identity shift and full coverage: every input can realise every y."""

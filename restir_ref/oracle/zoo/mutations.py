@@ -7,12 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from restir_ref.batch import Array, ratio
+from restir_ref.batch import Array, ratio, where
 from restir_ref.chance import Chance
-from restir_ref.decorrelation import Move, mutate
+from restir_ref.decorrelation import Move, attempt, mutate
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.oracle.cells import Frame
-from restir_ref.oracle.mutations import FOLDS, Mutation, inverted, last_accepted, repeated
+from restir_ref.oracle.mutations import (
+    FOLDS,
+    Mutation,
+    inverted,
+    last_accepted,
+    repeated,
+    unsymmetric,
+    upside_down,
+)
 from restir_ref.oracle.scenes import Loop, Parts, Scene, reference_scene
 from restir_ref.oracle.zoo.bug import Bug
 
@@ -68,7 +76,22 @@ def blue(X: Reservoirs, here: Pixels, chance: Chance) -> Reservoirs:
     return mutate(X, here, chance, half_blue)
 
 
+def turned_round(X: Reservoirs, here: Pixels, chance: Chance) -> Reservoirs:
+    """A step whose ratio of transitions is upside down."""
+    return mutate(X, here, chance, upside_down)
+
+
+def printed(X: Reservoirs, here: Pixels, chance: Chance) -> Reservoirs:
+    """Two steps of Alg. 6: the mixture accepts, and what was accepted is forgotten if the last proposal is not."""
+    base, accepted = X, np.zeros(len(here.index), dtype=bool)
+    for _ in range(STEPS):
+        base, accepted = attempt(base, here, chance, half_blue)
+    return where(accepted, base, X)
+
+
 RIGHT = mutating(repeated(STEPS))
+UNEVEN = replace(RIGHT, here=Stepping, near=Stepping)
+"""Steps between cells of unequal volumes, whose densities are no symmetric ones."""
 
 MUTATION_BUGS = (
     Bug(
@@ -95,7 +118,7 @@ MUTATION_BUGS = (
         "bright or dark lines where a primary sample number is 0 or 1",
         "[MCMC 3.2.1, 5.2.2]",
         reference_scene,
-        right=replace(RIGHT, here=Stepping, near=Stepping),
+        right=UNEVEN,
         wrong=replace(RIGHT, here=Clamping, near=Clamping),
     ),
     Bug(
@@ -106,5 +129,32 @@ MUTATION_BUGS = (
         reference_scene,
         right=RIGHT,
         wrong=mutating(repeated(STEPS, blue)),
+    ),
+    Bug(
+        "transition ratio left out",
+        "The proposal is symmetric in the numbers that were stepped, and another number follows from where it leads.",
+        "bright or dark where the moved vertex comes near to what it is joined to",
+        "[MCMC 3.2.1, 4.1]",
+        reference_scene,
+        right=UNEVEN,
+        wrong=replace(mutating(repeated(STEPS, unsymmetric)), here=Stepping, near=Stepping),
+    ),
+    Bug(
+        "transition ratio upside down",
+        "The code has T(u -> u') over T(u' -> u): primes are easily lost between derivation and code.",
+        "bright or dark where the moved vertex comes near to what it is joined to, and stronger than without the ratio",
+        "[MCMC 3.2.1, 4.1]",
+        reference_scene,
+        right=UNEVEN,
+        wrong=replace(mutating(repeated(STEPS, turned_round)), here=Stepping, near=Stepping),
+    ),
+    Bug(
+        "blue noise by the printed algorithm",
+        "Algorithm 6 as it stands: the mixed acceptance, and `accept` that only the last proposal decides.",
+        "own pixels look right, but bright or dark after the next spatial pass",
+        "[MCMC Alg. 6]",
+        reference_scene,
+        right=RIGHT,
+        wrong=mutating(printed),
     ),
 )

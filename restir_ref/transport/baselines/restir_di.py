@@ -121,10 +121,14 @@ def direct_light(
     *,
     passes: Passes = WHOLE,
 ) -> Reservoirs:
-    """One frame: candidates, temporal reuse if there is history, spatial reuse; visibility after every pass."""
+    """One frame: candidates, temporal reuse if there is history, mutations, spatial reuse; visibility after every pass.
+
+    Mutations see visibility themselves (`light_mutations`).
+    """
     X = lit(passes.initial(here, chance, CANDIDATES), here)
     if history is not None:
         X = lit(passes.temporal(X, here, history, before, chance, mis=mis), here)
+    X = passes.mutation(X, here, chance)
     return lit(passes.spatial(X, here, near, chance, mis=mis), here)
 
 

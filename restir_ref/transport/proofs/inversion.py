@@ -4,47 +4,14 @@ Shifts never need it (the reconnection data takes over), but their proof does: t
 scratch must find the same path, and its finite differences must give the same Jacobian.
 """
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from restir_ref.batch import Array, take
 from restir_ref.transport import materials as mat
-from restir_ref.transport.materials import Vertex
-from restir_ref.transport.paths import REPLAY, Path, Tracer, leaves, trace
-from restir_ref.transport.rays import vertex
-from restir_ref.transport.record import record
-from restir_ref.transport.shifts import replay
-from restir_ref.transport.vectors import normalize
+from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.retracing import Connection, connection, traced
 
-
-def traced(t: Tracer, u: Array, pixel: Array, k: Array, nee: Array) -> Path:
-    """The record of the path that primary samples u (D, N) give in `pixel` (N,) as leaf (k, nee)."""
-    tree = trace(t, u, pixel)
-    F = np.zeros((t.scene.C, len(k)))
-    for at, by_light, value in leaves(tree):
-        F = np.where((k == at) & (nee == by_light), value, F)
-    return record(t, tree, k, nee, F)
-
-
-@dataclass(frozen=True)
-class Connection:
-    """The two ends of a reconnection as one path sees them: x_(c-1), x_c, and the lobe shares at each."""
-
-    v: Vertex
-    z: Vertex
-    P_in: Array
-    P_out: Array
-    w: Array
-
-
-def connection(t: Tracer, x: Path, pixel: Array) -> Connection:
-    """Where the path of `pixel` (N,) leaves its free prefix; all columns must reconnect."""
-    v = replay(replace(t, rule=REPLAY), x, pixel).v  # as it is, whether or not it could have connected before
-    w = normalize(x.z - v.x)
-    z = vertex(t.scene, x.z, x.prim, -w)
-    table = t.scene.materials
-    return Connection(v, z, mat.lobe_shares(table, v), mat.lobe_shares(table, z), w)
+__all__ = ["Connection", "connection", "primary_sample", "traced"]
 
 
 def primary_sample(tx: Tracer, x: Path, pixel_x: Array, ty: Tracer, y: Path, pixel_y: Array) -> Array:
