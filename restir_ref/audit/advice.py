@@ -10,7 +10,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from restir_ref.audit.facts import LEAST, Draw, Facts, mass_of, techniques_of
+from restir_ref.audit.changes import mass_of
+from restir_ref.audit.facts import LEAST, Draw, Facts, techniques_of
 from restir_ref.batch import Array
 
 
@@ -99,7 +100,7 @@ def _foreign(facts: Facts) -> str:
 
 def _black(facts: Facts) -> str:
     return (
-        f"what multiplies the pixel's own sample: {pixels(facts.black)} returned nothing in any outcome, which is not a "
+        f"what multiplies the pixel's own sample: {pixels(facts.black)} returned nothing in any outcome, which is no "
         "bias but a zero: a MIS weight that starts at 0 and grows with accepted neighbours, a count of 0, a flag."
     )
 
@@ -170,8 +171,8 @@ def differ_from(a: Array, b: Array) -> bool:
 
 def _outside(facts: Facts) -> str:
     return (
-        f"whose target and visibility: {pixels(facts.outside)} returned samples that have no light there, with a weight. "
-        "A sample was taken over with another pixel's answer (shadow ray, target), or without selecting by its target."
+        f"whose target and visibility: {pixels(facts.outside)} returned samples without light there, with a weight. A "
+        "sample was taken over with another pixel's answer (shadow ray, target), or without selecting by its target."
     )
 
 
@@ -179,7 +180,7 @@ def _by_place(facts: Facts) -> str:
     coin = next((c for c in coins(facts) if (abs(c.p - facts.factor) <= LEAST).any()), None)
     thrown = f"; call {coin.call} of choose() is a coin of that probability" if coin else ""
     return (
-        f"what is done to some samples only: cells are right or off by the same factor {fraction(facts.factor)}{thrown}. "
+        f"what is done to some samples only: cells are right or off by the factor {fraction(facts.factor)}{thrown}. "
         "Roulette that is not divided by its probability, a share that is dropped, a cut-off by bounce or distance."
     )
 
@@ -224,16 +225,16 @@ def _frames(facts: Facts) -> str:
 def _alike(facts: Facts) -> str:
     return (
         f"what is taken from {sources(facts)} as it is: the bias is gone where all pixels are alike. Target evaluated "
-        "anew here, W = sum w / p_hat with p_hat of *this* pixel, MIS weights of the shifted sample, the neighbour's own "
-        "visibility, normal or material; 1/M where supports differ."
+        "anew here, W = sum w / p_hat with p_hat of *this* pixel, MIS weights of the shifted sample, the neighbour's "
+        "own visibility, normal or material; 1/M where supports differ."
     )
 
 
 def _early(facts: Facts) -> str:
     return (
-        "new samples and counts: the bias stays where no sample can be shifted and where all pixels and frames are alike, "
-        "so it does not need reuse. Candidates first: their number, their pdf, what they are divided by; then counts and "
-        "confidences of the merge (k asked for against k accepted), the cap, what divides the sum."
+        "new samples and counts: the bias stays where no sample can be shifted, and where all pixels and frames are "
+        "alike, so it does not need reuse. Candidates first: their number, their pdf, what divides them; then counts "
+        "and confidences of the merge (k asked for against k accepted), the cap, what divides the sum."
     )
 
 
@@ -249,17 +250,17 @@ def _steps(facts: Facts) -> str:
 
 def _trivial(facts: Facts) -> str:
     return (
-        f"the arithmetic of merging {sources(facts)}: the bias stays where all pixels and frames are alike, so geometry, "
-        "targets and Jacobians are not to blame, and is gone without shifted samples. The sum of weights and when it "
-        "grows, W from the sum and not from the selected input, MIS weights that sum to 1, confidences and the cap, "
-        "inputs merged twice, who is asked and why, the random numbers."
+        f"the arithmetic of merging {sources(facts)}: the bias stays where all pixels and frames are alike, so "
+        "geometry, targets and Jacobians are not to blame, and is gone without shifted samples. The sum of weights, "
+        "when it grows, W from the sum and not from the selected input, MIS weights that sum to 1, confidences, "
+        "the cap, inputs merged twice, who is asked and why, the random numbers."
     )
 
 
 def _number(facts: Facts) -> str:
     return (
-        "tables of its own: with the cells renumbered the bias is another one, so something goes by the number of a cell "
-        "(bounce, visibility, conversion). Read the scene's tables when called, or take 'stays' below with care."
+        "tables of its own: with the cells renumbered the bias is another one, so something goes by the number of a "
+        "cell (bounce, visibility, conversion). Read the scene's tables when called, or take 'stays' below with care."
     )
 
 

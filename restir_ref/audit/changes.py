@@ -152,6 +152,9 @@ CHANGES: Mapping[str, Change] = MappingProxyType(
 )
 """By name, one thing absent each."""
 
+SCALES = ("bright", "dim", "large W", "small W")
+"""Those that change nothing but sizes."""
+
 
 def applies(name: str, old: Cells, n: int) -> bool:
     """Whether a change can change anything: frames where there are several, techniques likewise."""

@@ -1,8 +1,8 @@
 """Is somebody's estimator unbiased, and does it pay?  Enumerated, so answers are exact, not averages over noise.
 
 Definition 4.1 in full: E[W 1{X = x}] = v(x) in every cell of the support, 0 elsewhere, which is
-E[f(X) W] = int f for all f at once.  [GRIS Def. 4.1]  Where it fails, the same estimator is run again on changed scenes,
-which tells what its bias needs, and so where in its code to look.
+E[f(X) W] = int f for all f at once.  [GRIS Def. 4.1]  Where it fails, the same estimator is run again on changed
+scenes, which tells what its bias needs, and so where in its code to look.
 """
 
 import textwrap
@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from restir_ref.audit.advice import advice
-from restir_ref.audit.changes import CHANGES
+from restir_ref.audit.changes import CHANGES, SCALES
 from restir_ref.audit.facts import Facts, Moments, examined, fixed_draws, moments, read
 from restir_ref.audit.known import known_signatures, needing_the_same
 from restir_ref.audit.likeness import Lookalike, lookalikes
@@ -199,8 +199,9 @@ def _needs(report: EstimatorReport) -> Iterator[str]:
     if not (report.needs or report.stays):
         yield f"more than {FEW_TO_RERUN} outcomes: not run again on changed scenes; take fewer passes or cells"
         return
-    yield "the same estimator on scenes in which something is absent:"
-    for head, names in (("no bias without", report.needs), ("still biased without", report.stays)):
+    yield "the same estimator on scenes in which one thing is absent:"
+    stays = [name for name in report.stays if name not in SCALES]
+    for head, names in (("no bias without", report.needs), ("still biased without", stays)):
         said = "; ".join(CHANGES[name].absent for name in names) or "-"
         yield from textwrap.wrap(f"  {head}: {said}", WIDTH, subsequent_indent="    ")
 

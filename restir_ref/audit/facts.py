@@ -220,8 +220,8 @@ def techniques_of(draw: Draw, tables: Cells) -> list[int]:
     mass = mass_of(tables)
     if len(draw.p) != mass.shape[-1]:
         return []
-    same = (abs(mass[:, :, None] - draw.p.T) <= LEAST).all(axis=-1).any(axis=1)
-    return [t for t, each in enumerate(same) if each.all()]
+    off = np.asarray(abs(mass[:, :, None] - draw.p.T).max(axis=-1).min(axis=1).max(axis=-1))
+    return [int(t) for t in np.flatnonzero(off <= LEAST)]
 
 
 def _rerun(estimator: Estimator, scene: Scene, most_leaves: int, other: Cells) -> tuple[Moments, Array]:

@@ -93,7 +93,7 @@ NEIGHBOURS = {0: (1, 2), 1: (), 2: (0,)}
 
 
 def pairwise(k: Callable[[int], int], taps: Callable[[int], Sequence[int]], base: float) -> Estimator:
-    """Pairwise weights made for k(pixel) neighbours, merged with those at taps(pixel); the canonical one from `base`."""
+    """Pairwise weights made for k(pixel) neighbours, merged with taps(pixel); the canonical one grows from `base`."""
 
     def reuse(index: Array, chance: Any) -> Reservoirs:
         F = THREE.now
