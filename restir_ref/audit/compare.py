@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Check:
     @property
     def right(self) -> Array:
         """Where found was compared with what is expected, and is it."""
-        return np.asarray(self.compared & ~self.wrong)
+        return np.asarray((self.compared | ~np.isfinite(self.found)) & ~self.wrong)
 
     @property
     def wrong(self) -> Array:
@@ -103,7 +104,7 @@ def _where_sound(check: Check, sound: Array) -> Check:
 
 
 def _checks(dump: Dump, compute: Compute, tolerance: Tolerance, skipped: Sequence[str]) -> Iterator[Check]:
-    p, found = replace(dump.recorded, blur=tolerance.of("u")), dump.found
+    p, found = blurred(dump.recorded, tolerance.of("u")), dump.found
     terms, chosen, settled = _computed(p, compute)
     for term, compared, follows in _given_twice(p, terms):
         if term in found and term not in skipped:
@@ -122,7 +123,7 @@ def _checks(dump: Dump, compute: Compute, tolerance: Tolerance, skipped: Sequenc
 def _results(p: Pass, terms: Terms) -> Iterator[tuple[str, Array, Array, Array]]:
     """m where it matters, that is where w would not be 0 anyway; w and its sum."""
     yield "m", terms.m, (p.J > 0) & (p.W > 0) & (p.p_hat > 0), SMALL_M
-    yield "w", terms.w, ALL, SMALL_W * terms.w_sum
+    yield "w", terms.w, ALL, SMALL_W * np.nan_to_num(terms.w_sum)
     yield "w_sum", terms.w_sum, ALL, np.zeros(1)
 
 
@@ -142,18 +143,30 @@ def _given_twice(p: Pass, terms: Terms) -> Iterator[tuple[str, Array, Callable[[
     yield "p_hat_from", reached, lambda: densities(terms.of)
 
 
+@lru_cache(maxsize=4)
+def blurred(p: Pass, blur: float) -> Pass:
+    """A pass whose numbers may be off by so much; one object for one pass, so that what is computed of it is kept."""
+    return replace(p, blur=blur)
+
+
+@lru_cache(maxsize=4)
+def unselected(p: Pass) -> Pass:
+    """A pass without its recorded selection, likewise."""
+    return replace(p, s=None)
+
+
 def _computed(p: Pass, compute: Compute) -> tuple[Terms, Array, Array]:
     """Terms, the inputs that the numbers select, and in which columns a recorded s is one of those allowed.
 
     Numbers near a boundary may select either side.  Given an allowed s, terms are those of s.
     """
-    free = compute(replace(p, s=None))
+    free = compute(unselected(p))
     if p.s is None:
         return free, free.s, free.clear
     chosen = free.s if p.u else free.w.argmax(axis=0)
     unclear = ~free.clear if p.u else np.ones(len(chosen), dtype=bool)
     possible = np.take_along_axis(free.w, p.s[None], axis=0)[0] > 0
-    allowed = (free.w_sum == 0) | (possible & ((p.s == chosen) | unclear))
+    allowed = (free.w_sum == 0) | np.isnan(free.w_sum) | (possible & ((p.s == chosen) | unclear))
     s = np.where(allowed, p.s, chosen)
     return free if np.array_equal(s, free.s) else compute(replace(p, s=s)), chosen, allowed
 

@@ -4,7 +4,7 @@ A convention is another reading of the fields, or another end of the pass that i
 for within the readings that fit best.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from types import MappingProxyType
@@ -30,10 +30,14 @@ class Reading:
 
 @dataclass(frozen=True)
 class Convention:
-    """In words, whether a dump (fields, mis) leaves it open, and what it changes: fields, or the end of the pass."""
+    """In words, whether a dump leaves it open, and what it changes: fields, or the end of the pass.
+
+    It is tried where one of the terms that it touches is wrong without it.
+    """
 
     about: str
-    open_in: Callable[[Fields, str], bool]
+    touches: frozenset[str]
+    open_in: Callable[[Fields], bool]
     fields: Callable[[Fields], Fields]
     end: Callable[[Pass, Terms], Terms]
 
@@ -80,46 +84,55 @@ def relative_cap(found: Fields) -> Fields:
     return {**{name: values for name, values in found.items() if name != "cap"}, "c": c}
 
 
-def _several(found: Fields, mis: str) -> bool:
+def _several(found: Fields) -> bool:
     """Neighbours whose number a dump does not give."""
     return len(found["p_hat"]) > 1
 
+
+CHOSEN = frozenset(("s", "W_Y"))
+DOWN = CHOSEN | {"p_hat_own", "p_hat_from", "p_hat_back", "J_back", "m", "w", "w_sum"}
 
 CONVENTIONS: Mapping[str, Convention] = MappingProxyType(
     {
         "transposed": Convention(
             "densities are [j][i]: input j's for y_i stand in row j",
-            lambda found, mis: _several(found, mis) and bool({"p_hat_from", "p_hat_back"} & found.keys()),
+            DOWN,
+            lambda found: _several(found) and bool({"p_hat_from", "p_hat_back"} & found.keys()),
             transposed,
             as_it_ends,
         ),
         "undivided": Convention(
             "m and w are not divided by C, the sum of the confidences; W_Y is",
-            lambda found, mis: mis != GIVEN and bool({"m", "w", "w_sum"} & found.keys()),
+            frozenset(("m", "w", "w_sum")),
+            lambda found: bool({"m", "w", "w_sum"} & found.keys()),
             divided,
             as_it_ends,
         ),
         "mirrored": Convention(
             "the random numbers are used as 1 - u",
-            lambda found, mis: bool({"u", "u_stream"} & found.keys()) and bool({"s", "W_Y"} & found.keys()),
+            CHOSEN,
+            lambda found: bool({"u", "u_stream"} & found.keys()) and bool({"s", "W_Y"} & found.keys()),
             mirrored,
             as_it_ends,
         ),
         "relative cap": Convention(
             "the cap is a multiple of the canonical input's confidence",
-            lambda found, mis: "cap" in found and bool((found["c"][found["canonical"] == 1] != 1).any()),
+            DOWN | {"c_Y"},
+            lambda found: "cap" in found and bool((found["c"][found["canonical"] == 1] != 1).any()),
             relative_cap,
             as_it_ends,
         ),
         "c_Y capped": Convention(
             "c_Y = min(M_c, sum), as [GRIS 6.2] prints it",
-            lambda found, mis: "c_Y" in found and "cap" in found,
+            frozenset(("c_Y",)),
+            lambda found: "c_Y" in found and "cap" in found,
             as_it_is,
             lambda p, terms: replace(terms, c_Y=np.minimum(terms.c_Y, p.cap)),
         ),
         "c_Y uncapped": Convention(
             "c_Y is the sum of the confidences before the cap",
-            lambda found, mis: "c_Y" in found and "cap" in found,
+            frozenset(("c_Y",)),
+            lambda found: "c_Y" in found and "cap" in found,
             as_it_is,
             lambda p, terms: replace(terms, c_Y=uncapped(p)),
         ),
@@ -130,16 +143,20 @@ MOST_ASKED = 32
 """As many neighbours asked for are tried."""
 
 
-def readings(found: Fields, mis: str) -> Iterator[Reading]:
-    """The plain reading first, then all combinations of what the dump leaves open."""
-    names = [name for name, each in CONVENTIONS.items() if each.open_in(found, mis)]
-    orders = [(), *_orders(found)] if "u_stream" in found else [()]
+def readings(found: Fields, mis: str, wrong: Collection[str]) -> Iterator[Reading]:
+    """All combinations of what the dump leaves open and what touches a wrong term, the fewest first; not the plain one.
+
+    `wrong` are the terms that are wrong in the plain reading.
+    """
+    useful = {name: each for name, each in CONVENTIONS.items() if each.open_in(found) and each.touches & {*wrong}}
+    names = [name for name in useful if mis != GIVEN or name in ("mirrored", "c_Y capped", "c_Y uncapped")]
+    orders = [(), *_orders(found)] if "u_stream" in found and CHOSEN & {*wrong} else [()]
     for choice in sorted(product((0, 1), repeat=len(names)), key=sum):
         chosen = tuple(name for name, taken in zip(names, choice, strict=True) if taken)
         if not {"c_Y capped", "c_Y uncapped"} <= set(chosen):
-            yield from (Reading(chosen, order=order) for order in orders)
+            yield from (Reading(chosen, order=order) for order in orders if chosen or order)
     others = len(found["p_hat"]) - int(found["canonical"].sum())
-    if mis in ASKED and "k" not in found and others:
+    if mis in ASKED and "k" not in found and others and DOWN & {*wrong}:
         yield from (Reading((), float(k)) for k in range(1, MOST_ASKED + 1) if k != others)
 
 

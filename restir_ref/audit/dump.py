@@ -5,9 +5,11 @@ among those that are wrong, within the readings that fit best.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -32,8 +34,8 @@ SAMPLE, BLOCKS = 1600, 8
 NUMBERS_AT_ONCE = 2**20
 """Densities of a block of columns: some 200 MB."""
 
-LIKELY, MUCH = 3, 0.3
-"""So many readings are searched for mistakes, those that fit best and not much worse than the best; and the plain one."""
+LIKELY, MUCH = 3, 0.12
+"""So many readings are searched for mistakes, those that fit best and not much worse; and the plain one."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,12 @@ def audit_dump(source: Path | str | Mapping[str, Any], *, rtol: float = RTOL) ->
     The terms follow each other: J, p_hat_own, p_hat_back, J_back, p_hat_from, m, w, w_sum, s, W_Y, c_Y.
     Raises BadDump, a ValueError, for what cannot be read; `docs/audit.md` has the format.
     """
-    whole = opened(source)
+    with TemporaryDirectory(prefix="restir-ref-audit-") as folder:
+        return _report(opened(source, Path(folder)), rtol)
+
+
+def _report(whole: Whole, rtol: float) -> DumpReport:
+    """What is wrong with an opened dump."""
     tolerance = Tolerance(rtol, whole.eps)
     likely = settled(whole, tolerance)
     tally = Tally(whole, likely[0], tolerance)
@@ -151,15 +158,34 @@ def part(whole: Whole, start: int, stop: int, reading: Reading) -> Dump:
 def settled(whole: Whole, tolerance: Tolerance) -> list[Reading]:
     """The readings that fit the dump best, best first: one only if it leaves nothing wrong."""
     found = completed(_sample(whole), np.arange(whole.N))
-    scores: list[tuple[float, int, Reading]] = []
-    for place, reading in enumerate(readings(found, whole.mis)):
-        score = _score(found, whole, reading, tolerance)
-        if score == 1.0:
-            return [reading]
-        scores.append((score, place, reading))
-    ordered = sorted(scores, key=lambda each: (-round(each[0], 9), each[1]))[:LIKELY]
-    best = [reading for score, _, reading in ordered if score >= ordered[0][0] - MUCH]
-    return best if Reading() in best else [*best, Reading()]
+    impossible: BadDump | None = None
+    try:
+        score, wrong = _score(found, whole, Reading(), tolerance)
+    except BadDump as error:
+        impossible, score, wrong = error, -1.0, [*RESULTS]
+    if score == 1.0:
+        return [Reading()]
+    scores = [(score, 0, Reading())]
+    for place, reading in enumerate(readings(found, whole.mis, wrong), 1):
+        with suppress(BadDump):
+            score, _ = _score(found, whole, reading, tolerance)
+            if score == 1.0:
+                return [reading]
+            scores.append((score, place, reading))
+    if impossible:
+        raise impossible
+    return _likely(sorted(scores, key=lambda each: (-round(each[0], 9), each[1])))
+
+
+LOOSE = ("relative cap", "order")
+"""Conventions that fit many a wrong dump in part: they acquit, but no mistake is searched for beside them first."""
+
+
+def _likely(ordered: Sequence[tuple[float, int, Reading]]) -> list[Reading]:
+    """The best ones without loose conventions, the best of all, and the plain one."""
+    strict = [(score, reading) for score, _, reading in ordered if not (reading.order or set(LOOSE) & {*reading.names})]
+    near = [reading for score, reading in strict if score >= strict[0][0] - MUCH]
+    return list(dict.fromkeys([*near[:LIKELY], ordered[0][2], Reading()]))
 
 
 def _sample(whole: Whole) -> dict[str, Array]:
@@ -176,15 +202,19 @@ def _sample(whole: Whole) -> dict[str, Array]:
     }
 
 
-def _score(found: Mapping[str, Array], whole: Whole, reading: Reading, tolerance: Tolerance) -> float:
-    """The share of right columns, averaged over the terms; -1 where the reading is impossible."""
+def _score(found: Mapping[str, Array], whole: Whole, reading: Reading, tolerance: Tolerance) -> tuple[float, list[str]]:
+    """The share of right columns, averaged over the terms, -1 where numbers overflow; and the wrong terms.
+
+    Raises BadDump.
+    """
     N = found["p_hat"].shape[1]
+    dump = dump_of(read_as(found, reading), whole.mis, np.arange(N), reading.order)
     try:
-        dump = dump_of(read_as(found, reading), whole.mis, np.arange(N), reading.order)
         done = list(checks(dump, ending(reading, right), tolerance))
     except ValueError:
-        return -1.0
-    return 1 - float(np.mean([in_column(check.wrong).mean() for check in done])) if done else 1.0
+        return -1.0, [*RESULTS]
+    wrong = {check.term: float(in_column(check.wrong).mean()) for check in done}
+    return 1 - sum(wrong.values()) / max(1, len(wrong)), [term for term, share in wrong.items() if share]
 
 
 @dataclass

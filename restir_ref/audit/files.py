@@ -8,7 +8,6 @@ import csv
 import json
 import re
 import shutil
-import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
@@ -22,22 +21,25 @@ import numpy as np
 from restir_ref.audit.fields import WORDS, BadDump
 from restir_ref.batch import Array
 
-MOST_BYTES = 2**34
-"""Unpacked size of the largest archive: 16 GiB, on disk."""
+MOST_BYTES = 2**33
+"""Unpacked size of the largest archive: 8 GiB, on disk."""
 
 IN_MEMORY = 2**27
 """Archives that unpack to more bytes are not read whole."""
 
 
+SMALL = 2**16
+"""Arrays of fewer bytes are read."""
+
+
 @dataclass(frozen=True)
 class Stored:
-    """An array that lies in a file from `offset` on, in C order; `folder` holds the file as long as this is used."""
+    """An array that lies in a file from `offset` on, in C order."""
 
     path: Path
     offset: int
     dtype: Any
     shape: tuple[int, ...]
-    folder: Any
 
     def columns(self, start: int, stop: int) -> Array:
         """Columns start .. stop of the last axis, (..., stop - start)."""
@@ -54,8 +56,8 @@ class Stored:
         return np.fromfile(self.path, self.dtype, count, offset=self.offset + start * self.dtype.itemsize)
 
 
-def read(path: Path | str) -> dict[str, Any]:
-    """The fields of a .npz, .json or .csv file.
+def read(path: Path | str, folder: Path) -> dict[str, Any]:
+    """The fields of a .npz, .json or .csv file; arrays of large archives are unpacked into a folder.
 
     Raises BadDump for files that are none of them, corrupt, pickled or too large.
     """
@@ -68,7 +70,7 @@ def read(path: Path | str) -> dict[str, Any]:
             raise BadDump(f"there is no file {path}: pass a dump, a .npz archive, a .json or a .csv file.")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return reader(path)
+            return reader(path, folder)
     except BadDump:
         raise
     except Exception as error:  # hazard: for damaged bytes zipfile, its decoders and NumPy raise a dozen types
@@ -79,7 +81,7 @@ def read(path: Path | str) -> dict[str, Any]:
 # ---------------------------------------------------------------- archives
 
 
-def _arrays(path: Path) -> dict[str, Any]:
+def _arrays(path: Path, folder: Path) -> dict[str, Any]:
     """The arrays of an archive, if they are not too large; what its directory says of their sizes is a bound."""
     with zipfile.ZipFile(path) as members:
         size = sum(member.file_size for member in members.infolist())
@@ -89,41 +91,41 @@ def _arrays(path: Path) -> dict[str, Any]:
             "audited by itself."
         )
     if size > IN_MEMORY:
-        return _unpacked(path)
+        return _unpacked(path, folder)
     with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
 
 
-def _unpacked(path: Path) -> dict[str, Any]:
-    """The arrays of an archive, unpacked into files of a folder that lives as long as they do."""
-    folder = tempfile.TemporaryDirectory(prefix="restir-ref-audit-")
+def _unpacked(path: Path, folder: Path) -> dict[str, Any]:
+    """The arrays of an archive, unpacked into files."""
     found: dict[str, Any] = {}
     with zipfile.ZipFile(path) as members:
         for number, member in enumerate(members.infolist()):
-            target = Path(folder.name, f"{number}.npy")
+            target = folder / f"{number}.npy"
             with members.open(member) as packed, target.open("wb") as file:
                 shutil.copyfileobj(packed, file, 2**20)
-            found[member.filename.removesuffix(".npy")] = _stored(target, folder)
+            found[member.filename.removesuffix(".npy")] = _stored(target)
     return found
 
 
-def _stored(path: Path, folder: Any) -> Any:
+def _stored(path: Path) -> Any:
     """An array left in its file; small ones, and those in Fortran order, are read."""
     with path.open("rb") as file:
         version = np.lib.format.read_magic(file)
         header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, fortran, dtype = header(file)
-        if fortran or len(shape) == 0 or dtype.hasobject or dtype.kind not in "biuf":
-            return np.load(path, allow_pickle=False)
-        if path.stat().st_size < file.tell() + prod(shape) * dtype.itemsize:
-            raise ValueError("an array is shorter than its header says")
-        return Stored(path, file.tell(), dtype, shape, folder)
+        size, start = prod(shape) * dtype.itemsize, file.tell()
+    if fortran or size < SMALL or dtype.kind not in "biuf":
+        return np.load(path, allow_pickle=False)
+    if path.stat().st_size < start + size:
+        raise ValueError("an array is shorter than its header says")
+    return Stored(path, start, dtype, shape)
 
 
 # ---------------------------------------------------------------- JSON
 
 
-def _object(path: Path) -> dict[str, Any]:
+def _object(path: Path, folder: Path) -> dict[str, Any]:
     """The members of a JSON object, each named once; a byte order mark is no part of it."""
     fields = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=_each_once)
     if not isinstance(fields, dict):
@@ -146,7 +148,7 @@ def _each_once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 COLUMN = re.compile(r"(?P<name>\w+)(?P<index>(?:\[\d+\])*)$")
 
 
-def _table(path: Path) -> dict[str, Any]:
+def _table(path: Path, folder: Path) -> dict[str, Any]:
     """A table: `# mis,talbot` first, then names like p_hat[0] or p_hat_from[0][1], then one line per pixel."""
     lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     head = [line for line in lines if line and line[0].lstrip().startswith("#")]
@@ -198,7 +200,7 @@ NO_ARCHIVE = (
 )
 NO_JSON = "no JSON ({}): write one object with a list of numbers per field."
 NO_TABLE = "no table ({}): write a line of names, then one line of numbers per pixel."
-READERS: Mapping[str, tuple[Callable[[Path], dict[str, Any]], str]] = {
+READERS: Mapping[str, tuple[Callable[[Path, Path], dict[str, Any]], str]] = {
     ".npz": (_arrays, NO_ARCHIVE),
     ".json": (_object, NO_JSON),
     ".csv": (_table, NO_TABLE),

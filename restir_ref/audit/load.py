@@ -75,14 +75,17 @@ class Whole:
         if name in WHOLE:
             return np.asarray(values)
         if name in self.columns_first:
-            rows = values.rows(start, stop) if isinstance(values, Stored) else values[start:stop]
+            rows = values.rows(start, stop) if isinstance(values, Stored) else np.asarray(values[start:stop])
             return np.moveaxis(rows, 0, -1)
         return values.columns(start, stop) if isinstance(values, Stored) else np.asarray(values[..., start:stop])
 
 
-def opened(source: Path | str | Mapping[str, Any]) -> Whole:
-    """A dump from a file or from a mapping of names to arrays; raises BadDump."""
-    fields = source if isinstance(source, Mapping) else read(source)
+def opened(source: Path | str | Mapping[str, Any], folder: Path) -> Whole:
+    """A dump from a file or from a mapping of names to arrays; large archives are unpacked into a folder.
+
+    Raises BadDump.
+    """
+    fields = source if isinstance(source, Mapping) else read(source, folder)
     mis = word(fields, "mis")
     check_names(fields)
     if mis not in (*KNOWN, GIVEN):
@@ -104,8 +107,12 @@ class _Shape:
 
 
 def _array(name: str, values: Any) -> Any:
-    """Real numbers of any type, in memory or in a file."""
-    return values if isinstance(values, Stored) else array(name, values)
+    """Real numbers of any type, in memory or in a file; fields without columns are always small."""
+    if isinstance(values, Stored):
+        if name not in WHOLE and values.shape and 0 not in values.shape:
+            return values
+        raise BadDump(f"{name!r} has shape {values.shape} in a file of its own: {ARRAYS[name].meaning}.")
+    return array(name, values)
 
 
 def _layout(arrays: Mapping[str, Any]) -> tuple[int, int, tuple[str, ...]]:
@@ -166,6 +173,13 @@ def rated(found: Mapping[str, Any], mis: str) -> bool:
     return mis in BLIND or "p_hat_back" in found or "p_hat_from" in found
 
 
+def load(fields: Mapping[str, Any]) -> Dump:
+    """All columns of a dump in memory, as they stand; raises BadDump."""
+    whole = opened(fields, Path())
+    index = np.arange(whole.N)
+    return dump_of(completed(whole.part(0, whole.N), index), whole.mis, index)
+
+
 # ---------------------------------------------------------------- some columns
 
 
@@ -193,7 +207,7 @@ def dump_of(found: Fields, mis: str, index: Array, order: Sequence[int] = ()) ->
 def _safe(name: str, values: Array, sound: Array) -> Array:
     """The values, and 1 in columns that are not compared."""
     if name in (*INPUTS, *DENSITIES) and name not in WHOLE:
-        return np.where(sound, values, 1.0)
+        return np.asarray(np.where(sound, values, 1.0))
     return values
 
 
@@ -220,7 +234,7 @@ def _canonical(found: Fields) -> Array:
     close = abs(own - found["p_hat"]) <= 1e-3 * abs(found["p_hat"])
     like = ((found["J"] == 1) & close).all(axis=1)
     chosen = int(np.argmax(like)) if like.any() else 0
-    return (np.arange(M) == chosen).astype(float)
+    return np.asarray(np.arange(M) == chosen, dtype=float)
 
 
 def _check_values(found: Fields, mis: str, index: Array) -> None:

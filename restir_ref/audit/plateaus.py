@@ -27,8 +27,8 @@ class Plateau:
     def __str__(self) -> str:
         return (
             f"{self.field} is {self.value:.6g} in {self.times} of {self.of} places, its {self.end}, while no other "
-            "value comes twice: it looks clamped before it was dumped. The pass is consistent, and biased all the same: "
-            f"dump {self.field} before the clamp, and refuse a shift both ways instead of clamping it."
+            "value comes twice: it looks clamped before it was dumped. The pass is consistent, and biased all the "
+            f"same: dump {self.field} before the clamp, and refuse a shift both ways instead of clamping it."
         )
 
 

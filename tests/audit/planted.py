@@ -19,7 +19,7 @@ def fields(canonical=THREE, n: int = N, **more: Any) -> dict[str, Any]:
 def streamed(**more: Any) -> dict[str, Any]:
     given = fields(**more)
     del given["u"]
-    return {**given, "u_stream": np.random.default_rng(6).random((M, N))}
+    return {**given, "u_stream": np.random.default_rng(6).random(given["p_hat"].shape)}
 
 
 def lonely(**more: Any) -> dict[str, Any]:

@@ -12,11 +12,10 @@ from restir_ref.audit.conventions import CONVENTIONS, Reading, in_words, read_as
 from restir_ref.audit.engines import asked_defensive, asked_pairwise
 from restir_ref.audit.load import completed
 from restir_ref.audit.plateaus import plateaus
-from restir_ref.audit.recorded import weights_of
 from restir_ref.batch import ratio, total
 from restir_ref.mis import Confidences
 from tests.audit.planted import PLANTED, fields, streamed
-from tests.audit.shader import Shader, dumped
+from tests.audit.shader import Shader, dumped, scattered_passes
 
 Dump = dict[str, Any]
 WHOLE = ("format", "version", "mis", "canonical", "cap")
@@ -47,7 +46,8 @@ def pixel_first(dump: Dump) -> Dump:
 
 
 def in_float32(dump: Dump) -> Dump:
-    return {n: v.astype(np.float32) if getattr(v, "dtype", None) == float and v.ndim else v for n, v in dump.items()}
+    wide = {name for name, v in dump.items() if name not in WHOLE and np.asarray(v).dtype == np.float64}
+    return {name: v.astype(np.float32) if name in wide else v for name, v in dump.items()}
 
 
 def several(dump: Dump) -> Dump:
@@ -74,7 +74,7 @@ def test_a_right_pass_is_right_in_every_convention(way, given, mis) -> None:
 
 
 @pytest.mark.parametrize("way", [undivided, several], ids=["undivided", "several"])
-@pytest.mark.parametrize("name", PLANTED)
+@pytest.mark.parametrize("name", [name for name in PLANTED if "divides W_Y" not in name])
 def test_a_planted_mistake_is_named_in_streamed_weights(name, way) -> None:
     shader, mis, given, _ = PLANTED[name]
     report = audit_dump(way(dumped(given(n=24), mis, shader)))
@@ -123,7 +123,7 @@ def test_a_cap_may_be_a_multiple_of_the_canonical_confidence() -> None:
 @pytest.mark.parametrize("order", [(1, 2, 0), (2, 1, 0)])
 def test_inputs_may_be_offered_in_another_order(order) -> None:
     """The engine streams its neighbours first, or backwards; the dump lists the pixel's own reservoir first."""
-    offered = streamed(n=24)
+    offered = streamed(n=200)
     at, back = np.array(order), np.argsort(order)
     by_input = ("canonical", "p_hat", "W", "J", "c", "p_hat_own", "u_stream")
     theirs = {name: v[at] if name in by_input else v for name, v in offered.items()}
@@ -222,15 +222,26 @@ def test_values_of_a_grid_are_no_clamp() -> None:
 # ---------------------------------------------------------------- readings
 
 
-def test_the_plain_reading_comes_first_and_changes_nothing() -> None:
+def small() -> Dump:
+    given = {name: np.asarray(v) for name, v in fields(n=4).items() if name not in ("format", "version")}
+    return completed(given, np.arange(4))
+
+
+def test_the_plain_reading_changes_nothing() -> None:
     found = completed(
         {n: np.asarray(v) for n, v in fields(n=4).items() if n not in ("format", "version")}, np.arange(4)
     )
-    first, *others = readings(found, "talbot")
-    assert first == Reading()
-    assert read_as(found, first) is found
-    assert in_words(first) == []
-    assert len(others) > 0
+    assert read_as(found, Reading()) is found
+    assert in_words(Reading()) == []
+    assert Reading() not in readings(found, "talbot", ["s"])
+
+
+def test_a_convention_is_tried_only_where_it_touches_a_wrong_term() -> None:
+    found = {**small(), "m": np.ones((3, 4)), "s": np.zeros(4)}
+    tried = {each.names for each in readings(found, "talbot", ["m"])}
+    assert tried == {("transposed",), ("undivided",), ("transposed", "undivided")}
+    assert ("mirrored",) in [each.names for each in readings(found, "talbot", ["s"])]
+    assert list(readings(found, "talbot", [])) == []
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)
@@ -252,8 +263,6 @@ def accused(count: int) -> list[str]:
         mis = str(rng.choice(["talbot", "pairwise", "defensive", "1/Z", "constant", "counted defensive"]))
         M = int(rng.integers(1, 5))
         seed = int(rng.integers(2**31))
-        from tests.audit.shader import scattered_passes
-
         given = scattered_passes(M, 6, [True, *[False] * (M - 1)], np.random.default_rng(seed))
         numbers = {"u": rng.random(6)} if number % 2 else {"u_stream": rng.random((M, 6))}
         caps = {"cap": float(rng.choice([1.0, 2.0]))} if number % 3 == 0 else {}
@@ -261,14 +270,3 @@ def accused(count: int) -> list[str]:
         report = audit_dump(way(dumped({**given, **numbers, **caps}, mis)))
         found += [] if report.right else [f"{number}: {report}"]
     return found
-
-
-def test_weights_of_a_pass_are_those_it_names() -> None:
-    from restir_ref.audit.load import dump_of
-
-    found = {n: np.asarray(v) for n, v in fields(n=4).items() if n not in ("format", "version")}
-    dump = dump_of({**completed(found, np.arange(4)), "k": np.array(5.0)}, "counted defensive", np.arange(4))
-    assert (
-        weights_of(dump.recorded).m
-        is not weights_of(dump_of(completed(found, np.arange(4)), "talbot", np.arange(4)).recorded).m
-    )

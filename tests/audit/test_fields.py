@@ -45,7 +45,7 @@ BAD = {
     "a foreign field": (having(roughness=1), "unknown field 'roughness'", "fields are canonical"),
     "cap 0": (having(cap=0.0), "'cap' is 0", "must be positive"),
     "no canonical confidence": ({**spoiled("c", 0), "mis": "defensive"}, "column 1 has none", "null samples"),
-    "u of 1": (spoiled("u", 1.0), "'u' is 1.0 at [1] (1 of 4", "below 1"),
+    "u above 1": (spoiled("u", 1.5), "'u' is 1.5 at [1] (1 of 4", "below 1"),
     "u that is no number": (spoiled("u", np.nan), "'u' is nan at [1]", "below 1"),
     "one field with columns first": (having(W=RIGHT["W"].T), "'W' has shape (4, 3)", "columns last"),
     "another precision": (having(precision="fp24"), "'precision' says 'fp24'", "double, float, half"),
