@@ -1,11 +1,12 @@
 """A dump held against what its pass should have computed, term by term, in the order of computation."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
-from restir_ref.audit.load import Dump, recorded
+from restir_ref.audit.load import WHOLE, Dump, recorded
 from restir_ref.audit.recorded import Pass, Terms, densities
 from restir_ref.batch import Array, ratio
 
@@ -54,46 +55,75 @@ class Check:
     @property
     def right(self) -> Array:
         """Where found was compared with what is expected, and is it."""
-        return np.asarray(self.compared & ~self.wrong)
+        return np.asarray((self.compared | ~np.isfinite(self.found)) & ~self.wrong)
 
     @property
     def wrong(self) -> Array:
-        """Where found is not expected."""
+        """Where found is not expected; what is not finite is compared everywhere."""
         off = ~(abs(self.found - self.expected) <= self.tolerance) | np.isinf(self.expected)
         flushed = (self.found == 0) & (abs(self.expected) < UNDERFLOW)
-        return np.asarray(off & ~flushed & self.compared)
+        undefined = np.isnan(self.found) & np.isnan(self.expected)
+        return np.asarray(off & ~flushed & ~undefined & (self.compared | ~np.isfinite(self.found)))
+
+    @property
+    def excess(self) -> Array:
+        """The error in units of its tolerance where found is wrong, 1e300 where it is not finite, and -1 elsewhere."""
+        error = abs(self.found - self.expected) / np.maximum(self.tolerance, UNDERFLOW)
+        return np.asarray(np.where(self.wrong, np.nan_to_num(error, nan=1e300, posinf=1e300), -1))
 
     def worst(self) -> Wrong:
-        """The place where the error is largest in units of its tolerance."""
-        excess = np.where(self.wrong, abs(self.found - self.expected) / np.maximum(self.tolerance, UNDERFLOW), -1)
-        place = tuple(int(k) for k in np.unravel_index(excess.argmax(), excess.shape))
+        """The place where the error is largest in units of its tolerance; the first one, if it is not finite."""
+        place = tuple(int(k) for k in np.unravel_index(self.excess.argmax(), self.excess.shape))
         expected = np.broadcast_to(self.expected, self.found.shape)[place]
         columns = int(self.wrong.reshape(-1, self.wrong.shape[-1]).any(axis=0).sum())
         return Wrong(self.term, place, float(expected), float(self.found[place]), columns)
 
 
-def checks(dump: Dump, compute: Compute, rtol: float, skipped: Sequence[str] = ()) -> Iterator[Check]:
-    """Every dumped term that is not skipped beside the computed one."""
-    p, found = replace(dump.recorded, blur=rtol), dump.found
+@dataclass(frozen=True)
+class Tolerance:
+    """The relative tolerance of all terms, and what is added for terms that are stored less exactly."""
+
+    rtol: float
+    eps: Mapping[str, float]
+
+    def of(self, term: str) -> float:
+        """The relative tolerance of one term."""
+        return self.rtol + self.eps.get(term, max(self.eps.values(), default=0.0))
+
+
+def checks(dump: Dump, compute: Compute, tolerance: Tolerance, skipped: Sequence[str] = ()) -> Iterator[Check]:
+    """Every dumped term that is not skipped beside the computed one, in the columns that can be compared."""
+    for check in _checks(dump, compute, tolerance, skipped):
+        yield check if dump.sound.all() else _where_sound(check, dump.sound)
+
+
+def _where_sound(check: Check, sound: Array) -> Check:
+    """Elsewhere, what is found is what is expected."""
+    found = np.where(sound, check.found, check.expected)
+    return replace(check, found=found, compared=np.asarray(check.compared & sound))
+
+
+def _checks(dump: Dump, compute: Compute, tolerance: Tolerance, skipped: Sequence[str]) -> Iterator[Check]:
+    p, found = blurred(dump.recorded, tolerance.of("u")), dump.found
     terms, chosen, settled = _computed(p, compute)
     for term, compared, follows in _given_twice(p, terms):
         if term in found and term not in skipped:
             due = follows()
-            yield Check(term, due, found[term], compared, rtol * due)
+            yield Check(term, due, found[term], compared, tolerance.of(term) * due)
     for term, expected, compared, slack in _results(p, terms):
         if term in found:
-            yield Check(term, expected, found[term], compared, rtol * (expected + slack))
+            yield Check(term, expected, found[term], compared, tolerance.of(term) * (expected + slack))
     if p.s is not None:
         yield Check("s", np.where(settled, p.s, chosen), p.s, ALL, np.zeros(p.s.shape))
     for term, expected, compared in (("W_Y", terms.W_Y, settled), ("c_Y", terms.c_Y, ALL)):
         if term in found:
-            yield Check(term, expected, found[term], compared, rtol * expected)
+            yield Check(term, expected, found[term], compared, tolerance.of(term) * expected)
 
 
 def _results(p: Pass, terms: Terms) -> Iterator[tuple[str, Array, Array, Array]]:
     """m where it matters, that is where w would not be 0 anyway; w and its sum."""
     yield "m", terms.m, (p.J > 0) & (p.W > 0) & (p.p_hat > 0), SMALL_M
-    yield "w", terms.w, ALL, SMALL_W * terms.w_sum
+    yield "w", terms.w, ALL, SMALL_W * np.nan_to_num(terms.w_sum)
     yield "w_sum", terms.w_sum, ALL, np.zeros(1)
 
 
@@ -113,24 +143,48 @@ def _given_twice(p: Pass, terms: Terms) -> Iterator[tuple[str, Array, Callable[[
     yield "p_hat_from", reached, lambda: densities(terms.of)
 
 
+@lru_cache(maxsize=4)
+def blurred(p: Pass, blur: float) -> Pass:
+    """A pass whose numbers may be off by so much; one object for one pass, so that what is computed of it is kept."""
+    return replace(p, blur=blur)
+
+
+@lru_cache(maxsize=4)
+def unselected(p: Pass) -> Pass:
+    """A pass without its recorded selection, likewise."""
+    return replace(p, s=None)
+
+
 def _computed(p: Pass, compute: Compute) -> tuple[Terms, Array, Array]:
     """Terms, the inputs that the numbers select, and in which columns a recorded s is one of those allowed.
 
     Numbers near a boundary may select either side.  Given an allowed s, terms are those of s.
     """
-    free = compute(replace(p, s=None))
+    free = compute(unselected(p))
     if p.s is None:
         return free, free.s, free.clear
     chosen = free.s if p.u else free.w.argmax(axis=0)
     unclear = ~free.clear if p.u else np.ones(len(chosen), dtype=bool)
     possible = np.take_along_axis(free.w, p.s[None], axis=0)[0] > 0
-    allowed = (free.w_sum == 0) | (possible & ((p.s == chosen) | unclear))
+    allowed = (free.w_sum == 0) | np.isnan(free.w_sum) | (possible & ((p.s == chosen) | unclear))
     s = np.where(allowed, p.s, chosen)
     return free if np.array_equal(s, free.s) else compute(replace(p, s=s)), chosen, allowed
 
 
-def columns(dump: Dump, index: Array) -> Dump:
-    """The same dump with these columns only."""
-    whole = ("canonical", "cap")
-    found = {name: values if name in whole else values[..., index] for name, values in dump.found.items()}
-    return Dump(recorded(found, dump.recorded.mis), found)
+def columns(dump: Dump, at: Array) -> Dump:
+    """The same dump with these of its columns only."""
+    found = {name: values if name in WHOLE else values[..., at] for name, values in dump.found.items()}
+    return replace(
+        dump, recorded=recorded(found, dump.recorded.mis), found=found, index=dump.index[at], sound=dump.sound[at]
+    )
+
+
+def joined(parts: Sequence[Dump]) -> Dump:
+    """Columns of several parts of one dump, side by side."""
+    one = parts[0]
+    found = {
+        name: values if name in WHOLE else np.concatenate([part.found[name] for part in parts], axis=-1)
+        for name, values in one.found.items()
+    }
+    index, sound = (np.concatenate([getattr(part, name) for part in parts]) for name in ("index", "sound"))
+    return replace(one, recorded=recorded(found, one.recorded.mis), found=found, index=index, sound=sound)

@@ -6,7 +6,7 @@ JSON object with lists of numbers, or any mapping of names to arrays.  M inputs,
 
 import difflib
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -20,10 +20,6 @@ FORMAT, VERSION = "restir-ref dump", 1
 
 LARGEST = 1e75
 """Products of four numbers that are not larger are still finite."""
-
-
-MOST_NUMBERS = 2**27
-"""M M N of the largest pass: its audit takes ten arrays of that size, or some 10 GB."""
 
 
 class BadDump(ValueError):
@@ -61,6 +57,7 @@ DENSITIES: Mapping[str, Field] = MappingProxyType(
 OPTIONS: Mapping[str, Field] = MappingProxyType(
     {
         "cap": Field("", "cap on the confidences of inputs that are not canonical"),
+        "k": Field("", "neighbours asked for, where weights count them and not those accepted"),
         "u": Field("N", "the number in [0, 1) that inverts the running sum of w"),
         "u_stream": Field("MN", "one number in [0, 1) per input: taken if u w_sum < w, w_sum including w"),
     }
@@ -76,7 +73,7 @@ RESULTS: Mapping[str, Field] = MappingProxyType(
     }
 )
 ARRAYS: Mapping[str, Field] = MappingProxyType({**INPUTS, **DENSITIES, **OPTIONS, **RESULTS})
-WORDS = ("format", "version", "mis")
+WORDS = ("format", "version", "mis", "precision")
 LONGEST_WORD = 40
 """Words are read, and quoted, up to here."""
 
@@ -84,7 +81,11 @@ IGNORED = "note"
 """Fields whose name begins like this are for people."""
 
 
-def check_names(fields: Mapping[str, Any], required: Mapping[str, Field]) -> None:
+NEEDED = ("p_hat", "W")
+"""Without these there is no pass; everything else has a default, or goes unchecked."""
+
+
+def check_names(fields: Mapping[str, Any]) -> None:
     """Raise BadDump for another format or version, for unknown fields and for missing ones."""
     _check_header(fields)
     known = (*WORDS, *ARRAYS)
@@ -94,7 +95,7 @@ def check_names(fields: Mapping[str, Any], required: Mapping[str, Field]) -> Non
                 f"unknown field {reprlib.repr(name)}: {_suggestion(str(name)[:LONGEST_WORD])}; "
                 f"fields named {IGNORED}... are ignored."
             )
-    missing = [f"{name!r} ({field.meaning})" for name, field in required.items() if name not in fields]
+    missing = [f"{name!r} ({ARRAYS[name].meaning})" for name in NEEDED if name not in fields]
     if missing:
         raise BadDump(f"the dump has no {', no '.join(missing)}: write what the pass used.")
 
@@ -122,24 +123,47 @@ def _suggestion(name: str) -> str:
     return "; ".join(known or near) or f"fields are {', '.join(ARRAYS)}"
 
 
-def numbers(fields: Mapping[str, Any], name: str, sizes: Mapping[str, int]) -> Array:
-    """A field as float64 array, if its axes have these sizes and its numbers are finite and not negative."""
-    given = array(name, fields[name])
+def shaped(name: str, given: Any, sizes: Mapping[str, int]) -> None:
+    """Raise BadDump unless a field has real numbers, and axes of these sizes: columns last, or first in every field."""
     wanted = tuple(sizes[axis] for axis in ARRAYS[name].axes)
     if given.shape != wanted:
         raise BadDump(
             f"{name!r} has shape {given.shape}, but its axes ({', '.join(ARRAYS[name].axes)}) are {wanted}: "
             f"{ARRAYS[name].meaning}; M inputs, N columns, columns last."
         )
-    values = given.astype(float)
-    bad = ~((values >= 0) & (values <= LARGEST))
-    if bad.any():
-        where = tuple(int(k) for k in np.argwhere(bad)[0])
-        raise BadDump(
-            f"{name!r} is {values[where]} at {list(where)} ({int(bad.sum())} of {values.size} values are bad), but "
-            f"must be finite, not negative and at most {LARGEST:.0e}: {ARRAYS[name].meaning}."
-        )
-    return values
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A number that none of a pass should be: the field, its first place [input(s), column], and in how many columns.
+
+    What it spoils is not compared.
+    """
+
+    term: str
+    where: Sequence[int]
+    value: float
+    columns: int
+
+    def __str__(self) -> str:
+        inputs = "".join(f"[{i}]" for i in self.where[:-1])
+        size = "1 column" if self.columns == 1 else f"{self.columns} columns"
+        kind = "negative" if self.value < 0 else "beyond all bounds" if np.isfinite(self.value) else "not finite"
+        return f"{self.term}{inputs} in column {self.where[-1]} is {self.value:.7g}: {kind} ({size}), {_came(self)}"
+
+
+def _came(defect: Defect) -> str:
+    """Where such a number comes from."""
+    if np.isnan(defect.value):
+        return "as 0/0 is: a density, a target or a sum of 0 that was divided by; it came in with the inputs"
+    if np.isinf(defect.value):
+        return "as 1/0 is, or a half float above 65504; it came in with the inputs"
+    return "and came in with the inputs"
+
+
+def improper(values: Array) -> Array:
+    """Which numbers are negative, not finite, or too large to be multiplied."""
+    return ~((values >= 0) & (values <= LARGEST))
 
 
 def array(name: str, values: Any) -> Array:
@@ -153,13 +177,18 @@ def array(name: str, values: Any) -> Array:
     return found
 
 
-def integers(name: str, values: Array, limit: int) -> Array:
-    """Whole numbers below a limit; raises BadDump naming the first that is not."""
-    bad = (values != np.floor(values)) | (values >= limit)
+def refuse(name: str, values: Array, bad: Array, must: str) -> None:
+    """Raise BadDump where anything is bad, naming the first such value and its place."""
     if bad.any():
         where = [int(k) for k in np.argwhere(bad)[0]]
         raise BadDump(
-            f"{name!r} is {values[tuple(where)]} at {where}, but must be a whole number below {limit}: "
-            f"{ARRAYS[name].meaning}."
+            f"{name!r} is {values[tuple(where)]} at {where} ({int(bad.sum())} of {values.size} values are bad), but "
+            f"must be {must}: {ARRAYS[name].meaning}."
         )
+
+
+def integers(name: str, values: Array, limit: int) -> Array:
+    """Whole numbers below a limit; raises BadDump naming the first that is not."""
+    bad = ~((values == np.floor(values)) & (values < limit) & (values >= 0))
+    refuse(name, values, bad, f"a whole number below {limit}")
     return values.astype(int)

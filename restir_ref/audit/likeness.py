@@ -1,6 +1,7 @@
-"""Which bugs of the zoo have the same signature: the same table of exact biases per cell, on the same scene.
+"""Which bugs of the zoo have the same signature: exactly the same table of biases per cell, on the same scene.
 
-A bug is compared in its own loop and in simpler ones, as long as they are unbiased without the bug.
+A bug is compared in its own loop and in simpler ones, as long as they are unbiased without the bug.  Tables that are
+only similar say nothing: of random tables without a bright cell every second is similar to that of some bug.
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,14 +13,19 @@ import numpy as np
 from restir_ref.batch import Array
 from restir_ref.mis import WEIGHTS
 from restir_ref.oracle.laws import bias_per_cell, expected_weight
-from restir_ref.oracle.scenes import Parts, Scene, one_frame
+from restir_ref.oracle.scenes import Parts, Scene, no_motion, one_frame, temporal_only, two_rounds
 from restir_ref.oracle.zoo import BUGS, Bug
 
 FEW_LEAVES = 100_000
 """Bugs whose enumeration is larger on this scene are not compared."""
 
-ALIKE, MOST_ALIKE = 0.9, 3
-"""From which likeness on bugs are named, and how many at most."""
+OTHER_LOOPS = {
+    "one frame": one_frame,
+    "temporal only": temporal_only,
+    "two rounds": two_rounds,
+    "no motion": no_motion,
+}
+"""Loops that a bug is tried in beside its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,39 +39,29 @@ class Signature:
 
 @dataclass(frozen=True)
 class Lookalike:
-    """A bug of the zoo in one of its loops; likeness is the cosine between both tables of biases, 1 if proportional."""
+    """A bug of the zoo, and the loop in which it has the same table."""
 
     bug: str
     loop: str
-    likeness: float
-    same: bool
 
     def __str__(self) -> str:
-        said = "exactly this table" if self.same else f"likeness {self.likeness:.3f}"
-        return f'"{self.bug}" ({self.loop}): {said}'
+        return f'"{self.bug}" ({self.loop}): exactly this table'
 
 
 def lookalikes(bias: Array, signatures: Iterable[Signature], tolerance: float) -> tuple[Lookalike, ...]:
-    """Bugs with exactly this table of biases (n, K), or else the most similar ones; each in its most similar loop."""
-    best: dict[str, Lookalike] = {}
+    """Bugs with exactly this table of biases (n, K), each in the first loop in which it has it."""
+    found: dict[str, Lookalike] = {}
     for each in signatures:
-        found = _likeness(bias, each, tolerance)
-        best[each.bug] = max(best.get(each.bug, found), found, key=lambda alike: (alike.same, alike.likeness))
-    same = tuple(each for each in best.values() if each.same)
-    alike = sorted(best.values(), key=lambda each: -each.likeness)[:MOST_ALIKE]
-    return same or tuple(each for each in alike if each.likeness >= ALIKE)
-
-
-def _likeness(bias: Array, known: Signature, tolerance: float) -> Lookalike:
-    cosine = (bias * known.bias).sum() / np.sqrt((bias**2).sum() * (known.bias**2).sum())
-    return Lookalike(known.bug, known.loop, float(cosine), _largest(bias - known.bias) <= tolerance)
+        if each.bug not in found and _largest(bias - each.bias) <= tolerance:
+            found[each.bug] = Lookalike(each.bug, each.loop)
+    return tuple(found.values())
 
 
 def signatures(scene: Scene, tolerance: float) -> Iterator[Signature]:
     """Those of every bug in every loop that runs on this scene and is biased by nothing but the bug."""
     table = cache(partial(_table, scene=scene))
     for bug in BUGS.values():
-        for loop, right, wrong in _loops(bug):
+        for loop, right, wrong in loops(bug):
             if _largest(table(right)) <= tolerance < _largest(table(wrong)):
                 yield Signature(bug.name, loop, table(wrong))
 
@@ -82,10 +78,11 @@ def _table(parts: Parts, scene: Scene) -> Array:
         return np.zeros(scene.v.shape)
 
 
-def _loops(bug: Bug) -> Iterator[tuple[str, Parts, Parts]]:
-    """The bug's own loop, and one frame of it with every weight that is not itself the bug: right and wrong."""
+def loops(bug: Bug) -> Iterator[tuple[str, Parts, Parts]]:
+    """The bug's own loop, the others, and one frame with every weight that is not itself the bug: right and wrong."""
     yield "its own loop", bug.right, bug.wrong
-    yield "one frame", replace(bug.right, steps=one_frame), replace(bug.wrong, steps=one_frame)
+    for loop, steps in OTHER_LOOPS.items():
+        yield loop, replace(bug.right, steps=steps), replace(bug.wrong, steps=steps)
     if bug.wrong.across is not bug.right.across:
         return
     merged_anew = bug.wrong.spatial is not bug.right.spatial  # and then c_i/m_i may be left out

@@ -6,11 +6,12 @@ in between, or the result changed after.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from restir_ref.audit.compare import Compute
-from restir_ref.audit.engines import KNOWN
+from restir_ref.audit.engines import KNOWN, asked_defensive
 from restir_ref.audit.load import Dump
 from restir_ref.audit.recorded import Pass, Terms, recompute, weights_of
 from restir_ref.batch import Array, ratio, total
@@ -27,8 +28,9 @@ class Mistake:
     compute: Compute
 
 
+@lru_cache(maxsize=4)
 def right(p: Pass) -> Terms:
-    """No mistake."""
+    """No mistake; kept, as half of the mistakes differ from it in the end only."""
     return recompute(p, weights_of(p))
 
 
@@ -90,6 +92,16 @@ def null_uncounted(p: Pass) -> Pass:
     return replace(p, c=np.where(p.W > 0, p.c, 0))
 
 
+def unlit_uncounted(p: Pass) -> Pass:
+    """Inputs whose sample is black here, or cannot be shifted, get confidence 0."""
+    return replace(p, c=np.where(p.canonical[:, None] | (p.p_hat * p.J > 0), p.c, 0))
+
+
+def unshifted_uncounted(p: Pass) -> Pass:
+    """Inputs whose shift is undefined get confidence 0."""
+    return replace(p, c=np.where(p.J > 0, p.c, 0))
+
+
 def confidence_left_out(p: Pass, terms: Terms) -> Terms:
     """Weights as if all confidences were 1; the merged one is their sum all the same."""
     return replace(right(replace(p, c=np.ones(p.c.shape))), c_Y=terms.c_Y)
@@ -98,11 +110,6 @@ def confidence_left_out(p: Pass, terms: Terms) -> Terms:
 def no_cap(p: Pass) -> Pass:
     """The cap forgotten."""
     return replace(p, cap=np.inf)
-
-
-def mirrored(p: Pass) -> Pass:
-    """1 - u for u."""
-    return replace(p, u=[np.minimum(1 - u, np.nextafter(1, 0)) for u in p.u])
 
 
 # ---------------------------------------------------------------- the weights
@@ -193,6 +200,30 @@ def stored_target(p: Pass, terms: Terms) -> Terms:
     return replace(terms, W_Y=ratio(terms.W_Y * at_s(p.p_hat, terms.s), at_s(stored, terms.s)))
 
 
+def never_divided(p: Pass, terms: Terms) -> Terms:
+    """W_Y C: the sum of the undivided weights over the target."""
+    return replace(terms, W_Y=terms.W_Y * count(p))
+
+
+def zero_over_zero(p: Pass, terms: Terms) -> Terms:
+    """W_Y = sum w / p_hat(y), also where both are 0."""
+    undefined = (terms.w_sum == 0) & (at_s(p.p_hat, terms.s) == 0)
+    return replace(terms, W_Y=np.where(undefined, np.nan, terms.W_Y))
+
+
+def undefined_weights(p: Pass, terms: Terms) -> Terms:
+    """m = 0/0 where nobody can make a sample, and everything after it."""
+    undefined = (terms.m == 0) & (p.p_hat == 0)
+    some = undefined.any(axis=0)
+    return replace(
+        terms,
+        m=np.where(undefined, np.nan, terms.m),
+        w=np.where(undefined, np.nan, terms.w),
+        w_sum=np.where(some, np.nan, terms.w_sum),
+        W_Y=np.where(some, np.nan, terms.W_Y),
+    )
+
+
 def uncorrected(p: Pass, terms: Terms) -> Terms:
     """W_Y = sum w / p_hat(y), without c_s / m_s."""
     return replace(terms, W_Y=ratio(terms.w_sum, at_s(p.p_hat, terms.s)))
@@ -214,11 +245,6 @@ def upto_selected(terms: Terms) -> Array:
     return np.asarray(np.where(later, 0, terms.w).sum(axis=0))
 
 
-def unnormalised(p: Pass, terms: Terms) -> Terms:
-    """w_i = c_i p_hat W J, divided by C at the end."""
-    return replace(terms, m=terms.m * count(p), w=terms.w * count(p), w_sum=terms.w_sum * count(p))
-
-
 def own_not_counted(p: Pass, terms: Terms) -> Terms:
     """m_i = c_i / C_N and the like: C without the pixel's own samples, which are merged all the same."""
     C_N = neighbours(p)
@@ -227,8 +253,8 @@ def own_not_counted(p: Pass, terms: Terms) -> Terms:
 
 
 def own_not_counted_at_the_end(p: Pass, terms: Terms) -> Terms:
-    """w_i = c_i p_hat W J, divided by C_N at the end."""
-    return replace(unnormalised(p, terms), W_Y=own_not_counted(p, terms).W_Y)
+    """The same in what divides W_Y only."""
+    return replace(terms, W_Y=own_not_counted(p, terms).W_Y)
 
 
 def clamped(limit: float) -> Compute:
@@ -279,6 +305,16 @@ MISTAKES = (
         "p_hat_i(X_i) in w, the target not evaluated anew", "W formed with the stored target", edited(at_old_target)
     ),
     Mistake("null samples have confidence 0", "null confidence 0", edited(null_uncounted)),
+    Mistake(
+        "inputs that are black here are not counted in M",
+        "neighbour skipped if its shifted target is 0",
+        edited(unlit_uncounted),
+    ),
+    Mistake(
+        "inputs whose shift fails are not counted in M",
+        "neighbour skipped if its sample cannot be shifted",
+        edited(unshifted_uncounted),
+    ),
     Mistake("confidences not multiplied in", "", ended(confidence_left_out)),
     Mistake("history not capped", "no cap on history", edited(no_cap)),
     Mistake("cap only in the denominator", "cap only in the denominator", weighted(capped_below)),
@@ -298,9 +334,12 @@ MISTAKES = (
     Mistake("no m in w", "", weighted(other(nothing))),
     Mistake("canonical weight 0 without neighbours", "", weighted(grown_from_zero)),
     Mistake("own samples not counted in C", "", ended(own_not_counted)),
-    Mistake("own samples not counted in C, the sum divided at the end only", "", ended(own_not_counted_at_the_end)),
+    Mistake("own samples not counted in the C that divides W_Y", "", ended(own_not_counted_at_the_end)),
     Mistake("W_Y divided by M once more", "divided by M twice", ended(divided_by_M)),
     Mistake("W_Y divided by the sum of confidences once more", "divided by M twice", ended(divided_by_C)),
+    Mistake("the sum is never divided by M (the sum of confidences)", "", ended(never_divided)),
+    Mistake("W_Y = 0/0 of null samples: test the target before dividing by it", "", ended(zero_over_zero)),
+    Mistake("m = 0/0 where nobody can make the sample: test the sum before dividing", "", ended(undefined_weights)),
     Mistake("W_Y = 1 / p_hat(y)", "", ended(one_over_target)),
     Mistake("W_Y = sum w, not divided by p_hat(y)", "", ended(not_divided)),
     Mistake("W_Y = W_s", "W of the selected sample kept", ended(selected_W)),
@@ -311,26 +350,73 @@ MISTAKES = (
     Mistake("the last weight is missing in the sum", "", with_sum(lambda terms: terms.w[:-1].sum(axis=0))),
     Mistake("the first weight is missing in the sum", "", with_sum(lambda terms: terms.w[1:].sum(axis=0))),
     Mistake("u compared with the sum before the new weight", "streaming against the old sum", against_old_sum),
-    Mistake("1 - u for u (no mistake by itself)", "", edited(mirrored)),
-    Mistake("the sum divided by C at the end only (no mistake by itself: dump w / C)", "", ended(unnormalised)),
     Mistake("c_Y counts samples that are not null", "null confidence 0", merged(alive)),
     Mistake("c_Y counts inputs, not confidences", "", merged(inputs_counted)),
-    Mistake("c_Y is not capped (no mistake by itself)", "", merged(uncapped)),
-    Mistake(
-        "c_Y is capped once more (no mistake by itself)",
-        "cap after the merge",
-        merged(lambda p: np.minimum(count(p), p.cap)),
-    ),
 )
 
 
 def suspects(dump: Dump) -> Iterator[Mistake]:
-    """All mistakes, other weights than the dump says, and a limit on W_Y where it shows: twice, as the largest."""
+    """All mistakes, other weights than the dump says, other numbers of neighbours, and limits where they show."""
     yield from MISTAKES
-    p, W_Y = dump.recorded, dump.found.get("W_Y", np.zeros(1))
-    limit = W_Y.max()
-    if limit > 0 and np.count_nonzero(limit == W_Y) > 1:
-        yield Mistake(f"W_Y clamped at {limit:.7g}", "W clamped", clamped(limit))
+    p = dump.recorded
+    yield from limits(dump)
     for name, mis in KNOWN.items():
         if name != p.mis:
             yield Mistake(f"the weights are {name!r}, not {p.mis!r}", "", weighted(lambda p, mis=mis: mis))  # type: ignore[misc]
+    if p.mis == "counted defensive":
+        for k in range(1, MOST_ASKED + 1):
+            if k != len(p.canonical) - p.canonical.sum():
+                said = f"divided by k + 1, k = {k} neighbours asked for, where those accepted count"
+                yield Mistake(said, "", weighted(lambda p, k=k: Weights(asked_defensive(k, k + 1.0))))  # type: ignore[misc]
+
+
+MOST_ASKED = 32
+"""As many neighbours asked for are tried."""
+
+
+def limits(dump: Dump) -> Iterator[Mistake]:
+    """Clamps that show: the same largest or smallest value twice, of W_Y, or of a factor of w."""
+    p, found = dump.recorded, dump.found
+    if (limit := plateau(found.get("W_Y", np.zeros(1)))) is not None:
+        yield Mistake(f"W_Y clamped at {limit:.7g}", "W clamped", clamped(limit))
+    if "w" not in found or not p.rated:
+        return
+    try:
+        expected = right(replace(p, s=None, u=())).w
+    except ValueError:  # overflow
+        return
+    for name in ("J", "W", "p_hat"):
+        factor = getattr(p, name)
+        used = np.where(expected > 0, factor * ratio(found["w"], expected), 0)[~p.canonical]
+        high, low = plateau(used), plateau(-used[used > 0])
+        if high is not None or low is not None:
+            ends = (-low if low is not None else 0.0, high if high is not None else np.inf)
+            bug = "Jacobian clamped in w" if name == "J" else ""
+            said = " and ".join(
+                f"{word} {end:.6g}" for word, end in zip(("at least", "at most"), ends, strict=True) if 0 < end < np.inf
+            )
+            yield Mistake(f"{name} clamped in w to {said}", bug, edited(clipped(name, *ends)))
+
+
+def plateau(values: Array) -> float | None:
+    """The largest value, if it is not 0 and there twice up to rounding."""
+    finite = values[np.isfinite(values)]
+    if finite.size == 0 or (top := float(finite.max())) == 0:
+        return None
+    return top if np.count_nonzero(abs(finite - top) <= ALIKE * abs(top)) > 1 else None
+
+
+ALIKE = 1e-5
+"""Values that differ by less are the same, computed twice."""
+
+
+def clipped(name: str, low: float, high: float) -> Callable[[Pass], Pass]:
+    """Another factor in w, between these ends; the densities of the MIS weights stay right."""
+
+    def edit(p: Pass) -> Pass:
+        factor = getattr(p, name)
+        ours = p.canonical[:, None] if name == "J" else np.array(False)
+        new = np.where(ours | (factor == 0), factor, np.clip(factor, low, high))
+        return replace(p, W=p.W * ratio(new, factor))
+
+    return edit

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from restir_ref.audit.engines import KNOWN
+from restir_ref.audit.engines import ASKED, KNOWN
 from restir_ref.audit.given import at
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
@@ -42,6 +42,7 @@ class Pass:
     s          the selected input (N,), where recorded
     m          (M, N)     the weights, where GIVEN
     blur       u may be off by this much
+    k          neighbours asked for, where the weights count those
     """
 
     mis: str
@@ -58,6 +59,7 @@ class Pass:
     s: Array | None = None
     m: Array | None = None
     blur: float = 0
+    k: float | None = None
 
     @property
     def rated(self) -> bool:
@@ -113,7 +115,8 @@ class Recorded:
 def weights_of(p: Pass) -> Weights:
     """The weights that a pass says it uses."""
     if p.mis != GIVEN:
-        return KNOWN[p.mis]
+        known = KNOWN[p.mis]
+        return known if p.k is None or p.mis not in ASKED else replace(known, m=ASKED[p.mis](p.k))
     m = np.asarray(p.m)
     return Weights(lambda i, q, c: m[i])
 

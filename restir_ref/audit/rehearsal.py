@@ -62,8 +62,10 @@ class Take:
     W: Array
 
 
-def rehearse(estimator: Estimator, cells: Array) -> None:
-    """Raise CannotAudit if the estimator is no function of index and choices, or of the wrong shape.
+def rehearse(estimator: Estimator, cells: Array) -> list[Array]:
+    """The weights that choose() is asked, (options, lanes n) per call.
+
+    Raises CannotAudit if the estimator is no function of index and choices, or of the wrong shape.
 
     `cells` (n, K) shows the numbers of pixels and cells.
     """
@@ -78,6 +80,7 @@ def rehearse(estimator: Estimator, cells: Array) -> None:
         )
     for lane in range(ALONE):
         _compare(_take(estimator, np.array([lane]), cells), first, lane)
+    return first.asked
 
 
 _ASKS_NOTHING = (

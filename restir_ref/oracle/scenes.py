@@ -149,6 +149,48 @@ def one_frame(parts: "Parts", scene: Scene) -> Loop:
     return loop
 
 
+def temporal_only(parts: "Parts", scene: Scene) -> Loop:
+    """New samples of two frames, merged once: no spatial reuse; pixels move by one."""
+    before, now = scene.made_of(parts.here).frames
+    past = scene.made_of(parts.near).frames[0]
+
+    def loop(index: Array, chance: Chance) -> Reservoirs:
+        there, here = Pixels(before, index), Pixels(now, index)
+        Y, X = parts.edit(parts.draw(there, chance), there), parts.edit(parts.draw(here, chance), here)
+        source, dice = [offset(past, index, 1)], parts.dice(chance)
+        return parts.temporal(X, here, Y, source, dice, mis=parts.along, cap=parts.cap)
+
+    return loop
+
+
+def two_rounds(parts: "Parts", scene: Scene) -> Loop:
+    """New samples and two rounds of spatial reuse."""
+    now, near = scene.made_of(parts.here).now, scene.made_of(parts.near).now
+
+    def loop(index: Array, chance: Chance) -> Reservoirs:
+        here, dice = Pixels(now, index), parts.dice(chance)
+        X = parts.edit(parts.draw(here, chance), here)
+        X = parts.edit(parts.spatial(X, here, parts.neighbours(near, index, X, chance), dice, mis=parts.across), here)
+        return parts.spatial(X, here, parts.neighbours(near, index, X, chance), dice, mis=parts.across)
+
+    return loop
+
+
+def no_motion(parts: "Parts", scene: Scene) -> Loop:
+    """Two frames of temporal reuse from the same pixel, then spatial reuse."""
+    before, now = scene.made_of(parts.here).frames
+    past, near = scene.made_of(parts.near).frames
+
+    def loop(index: Array, chance: Chance) -> Reservoirs:
+        there, here, dice = Pixels(before, index), Pixels(now, index), parts.dice(chance)
+        Y, X = parts.edit(parts.draw(there, chance), there), parts.edit(parts.draw(here, chance), here)
+        source = [offset(past, index, 0)]
+        X = parts.edit(parts.temporal(X, here, Y, source, dice, mis=parts.along, cap=parts.cap), here)
+        return parts.spatial(X, here, parts.neighbours(near, index, X, chance), dice, mis=parts.across)
+
+    return loop
+
+
 @dataclass(frozen=True)
 class Parts:
     """What a loop is made of; `parts(scene)` assembles it, and a zoo bug replaces one part.

@@ -19,7 +19,7 @@ def fields(canonical=THREE, n: int = N, **more: Any) -> dict[str, Any]:
 def streamed(**more: Any) -> dict[str, Any]:
     given = fields(**more)
     del given["u"]
-    return {**given, "u_stream": np.random.default_rng(6).random((M, N))}
+    return {**given, "u_stream": np.random.default_rng(6).random(given["p_hat"].shape)}
 
 
 def lonely(**more: Any) -> dict[str, Any]:
@@ -57,6 +57,33 @@ class OldTarget(Shader):
 class NullUncounted(Shader):
     def confidence(self, j):
         return super().confidence(j) if self.a.W[j] else 0
+
+
+class UnlitUncounted(Shader):
+    def confidence(self, j):
+        dark = j in self.others and not self.a.p_hat[j] * self.a.J[j]
+        return 0 if dark else super().confidence(j)
+
+
+class UnshiftedUncounted(Shader):
+    def confidence(self, j):
+        return super().confidence(j) if self.a.J[j] else 0
+
+
+class NeverDivided(Shader):
+    def W_Y(self, s, w_sum):
+        return super().W_Y(s, w_sum) * self.c_Y()
+
+
+class ZeroOverZero(Shader):
+    def W_Y(self, s, w_sum):
+        return super().W_Y(s, w_sum) if self.a.p_hat[s] or w_sum else np.nan
+
+
+class Undefined(Shader):
+    def m(self, i):
+        m = super().m(i)
+        return m if m or self.a.p_hat[i] else np.nan
 
 
 class UnitConfidence(Shader):
@@ -226,6 +253,8 @@ PLANTED = {
     "J squared in w": (SquaredJ, "talbot", fields, "w"),
     "p_hat_i(X_i) in w, the target not evaluated anew": (OldTarget, "talbot", fields, "w"),
     "null samples have confidence 0": (NullUncounted, "talbot", fields, "m"),
+    "inputs that are black here are not counted in M": (UnlitUncounted, "talbot", fields, "m"),
+    "inputs whose shift fails are not counted in M": (UnshiftedUncounted, "talbot", fields, "m"),
     "confidences not multiplied in": (UnitConfidence, "talbot", fields, "m"),
     "history not capped": (NoCap, "talbot", capped, "m"),
     "cap only in the denominator": (CapOnlyBelow, "talbot", capped, "m"),
@@ -237,9 +266,12 @@ PLANTED = {
     "no m in w": (NoM, "talbot", fields, "m"),
     "canonical weight 0 without neighbours": (GrownFromZero, "pairwise", lonely, "m"),
     "own samples not counted in C": (OwnNotCounted, "constant", fields, "m"),
-    "own samples not counted in C, the sum divided at the end only": (OwnNotCountedLate, "constant", fields, "m"),
+    "own samples not counted in the C that divides W_Y": (OwnNotCountedLate, "constant", fields, "W_Y"),
     "W_Y divided by M once more": (DividedByM, "pairwise", fields, "W_Y"),
     "W_Y divided by the sum of confidences once more": (DividedByC, "defensive", fields, "W_Y"),
+    "the sum is never divided by M (the sum of confidences)": (NeverDivided, "talbot", fields, "W_Y"),
+    "W_Y = 0/0 of null samples: test the target before dividing by it": (ZeroOverZero, "talbot", fields, "W_Y"),
+    "m = 0/0 where nobody can make the sample: test the sum before dividing": (Undefined, "talbot", fields, "m"),
     "W_Y = 1 / p_hat(y)": (OneOverTarget, "talbot", fields, "W_Y"),
     "W_Y = sum w, not divided by p_hat(y)": (NotDivided, "talbot", fields, "W_Y"),
     "W_Y = W_s": (SelectedW, "talbot", fields, "W_Y"),
@@ -250,10 +282,6 @@ PLANTED = {
     "the last weight is missing in the sum": (LastMissing, "talbot", fields, "w_sum"),
     "the first weight is missing in the sum": (FirstMissing, "talbot", fields, "w_sum"),
     "u compared with the sum before the new weight": (OldSum, "talbot", streamed, "s"),
-    "1 - u for u (no mistake by itself)": (Mirrored, "talbot", fields, "s"),
-    "the sum divided by C at the end only (no mistake by itself: dump w / C)": (LateDivision, "constant", fields, "m"),
     "c_Y counts samples that are not null": (CountsAlive, "talbot", fields, "c_Y"),
     "c_Y counts inputs, not confidences": (CountsInputs, "talbot", fields, "c_Y"),
-    "c_Y is not capped (no mistake by itself)": (NotCapped, "talbot", capped, "c_Y"),
-    "c_Y is capped once more (no mistake by itself)": (CappedTwice, "talbot", capped, "c_Y"),
 }

@@ -22,7 +22,7 @@ def outcome_of_mapping(dump: Any) -> str:
         said = str(audit_dump(dump))
     except BadDump as refused:
         return "refusal" if is_one_line(str(refused)) else "lines"
-    assert said.startswith(("right: ", "WRONG: "))
+    assert said.startswith(("right: ", "WRONG: ", "SUSPICIOUS: "))
     return "report"
 
 
@@ -35,7 +35,7 @@ def outcome_of_file(path: Path, capsys: Any) -> str:
         assert err.startswith("cannot read the dump: ")
         assert is_one_line(err.removesuffix("\n"))
         return "refusal"
-    assert out.startswith(("right: ", "WRONG: ")[status])
+    assert out.startswith((("right: ",), ("WRONG: ", "SUSPICIOUS: "))[status])
     assert err == ""
     return "report"
 
@@ -81,15 +81,6 @@ def test_an_archive_that_unpacks_to_too_much_is_not_unpacked(tmp_path, monkeypat
     monkeypatch.setattr(np, "load", pytest.fail)
     with pytest.raises(BadDump, match=r"bomb.npz unpacks to \d+ bytes, more than the limit of 8000000: dump fewer"):
         audit_dump(tmp_path / "bomb.npz")
-
-
-def test_a_pass_of_too_many_densities_is_refused_before_it_is_computed(monkeypatch) -> None:
-    """The audit of M inputs takes M M N numbers, though a dump of constant weights holds M N only."""
-    assert audit_dump(BASES[0]).right
-    M, N = BASES[0]["p_hat"].shape
-    monkeypatch.setattr(load, "MOST_NUMBERS", M * M * N - 1)
-    with pytest.raises(BadDump, match=rf"M M N = {M * M * N} densities, more than the limit .* dump fewer columns"):
-        audit_dump(BASES[0])
 
 
 def test_a_pass_that_does_not_fit_into_memory_is_refused_by_the_command(tmp_path, capsys, monkeypatch) -> None:
@@ -153,7 +144,7 @@ def test_a_suspect_that_takes_inputs_for_granted_is_noticed(pattern, crash, monk
 
 
 def test_a_reader_that_expects_some_errors_only_is_noticed(tmp_path, monkeypatch, capsys) -> None:
-    def expecting(path: Path) -> Any:
+    def expecting(path: Path, folder: Path) -> Any:
         try:
             with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 return {name: archive[name] for name in archive.files}

@@ -183,7 +183,7 @@ def test_the_special_cases_are_special() -> None:
 # ---------------------------------------------------------------- twins
 
 
-@pytest.mark.parametrize("name", PLANTED)
+@pytest.mark.parametrize("name", [name for name in PLANTED if "0/0" not in name])  # fractions have no NaN
 def test_a_planted_mistake_fails_some_golden_vector(name) -> None:
     shader, mis, _, _ = PLANTED[name]
     assert any(faults(case, run(case, mis, float, shader), "float32") for case in VECTORS[mis]["cases"])

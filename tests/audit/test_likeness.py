@@ -6,33 +6,25 @@ import numpy as np
 import pytest
 
 from restir_ref.audit import likeness
-from restir_ref.audit.estimator import TOLERANCE
+from restir_ref.audit.estimator import TOLERANCE, facts_of
+from restir_ref.audit.facts import Facts
+from restir_ref.audit.known import digest, known_signatures, needing_the_same
 from restir_ref.audit.likeness import Signature, lookalikes, signatures
-from restir_ref.oracle.scenes import reference_scene
-from restir_ref.oracle.zoo import BUGS
+from restir_ref.oracle.scenes import Scene, one_frame, reference_scene, three_pixel_scene, two_technique_scene
+from restir_ref.oracle.zoo import BUGS, Bug
 
 BIAS = np.array([[0.3, 0.0]])
 
 
-def at(cosine: float) -> Signature:
-    """A table of biases at an angle to BIAS."""
-    return Signature(str(cosine), "", 7 * np.array([[cosine, np.sqrt(1 - cosine**2)]]))
+def test_a_bug_is_named_for_exactly_the_same_table_and_for_no_other() -> None:
+    near = [Signature("twice", "", 2 * BIAS), Signature("almost", "", BIAS + 1e-6), Signature("same", "own", BIAS)]
+    assert [(each.bug, each.loop) for each in lookalikes(BIAS, near, TOLERANCE)] == [("same", "own")]
+    assert lookalikes(BIAS, near[:2], TOLERANCE) == ()
 
 
-@pytest.mark.parametrize(("cosine", "count"), [(0.91, 1), (0.89, 0), (-1.0, 0)])
-def test_a_bug_is_like_another_from_nine_tenths_on(cosine, count) -> None:
-    assert len(lookalikes(BIAS, [at(cosine)], TOLERANCE)) == count
-
-
-def test_the_three_most_similar_bugs_are_named_in_order() -> None:
-    found = lookalikes(BIAS, [at(c) for c in (0.93, 0.99, 0.91, 0.97, 0.95)], TOLERANCE)
-    assert [each.bug for each in found] == ["0.99", "0.97", "0.95"]
-    assert [each.likeness for each in found] == pytest.approx([0.99, 0.97, 0.95])
-
-
-def test_beside_the_same_table_similar_ones_are_not_named() -> None:
-    found = lookalikes(BIAS, [at(0.99), Signature("same", "", BIAS)], TOLERANCE)
-    assert [(each.bug, each.same) for each in found] == [("same", True)]
+def test_a_bug_is_named_once_with_its_first_loop() -> None:
+    twice = [Signature("same", "own", BIAS), Signature("same", "one frame", BIAS)]
+    assert [each.loop for each in lookalikes(BIAS, twice, TOLERANCE)] == ["own"]
 
 
 ONE_OVER_M = BUGS["1/M over unequal supports"]
@@ -54,6 +46,44 @@ def test_a_bug_has_a_table_in_loops_that_are_biased_by_nothing_else(name, monkey
 
 def test_a_table_of_just_this_bias_is_the_same_at_tolerance_zero() -> None:
     bias = np.array([[0.5, -0.25]])
-    (found,) = likeness.lookalikes(bias, [likeness.Signature("a bug", "a loop", bias)], 0.0)
-    assert found.same
-    assert not likeness.lookalikes(bias, [likeness.Signature("a bug", "a loop", 1.1 * bias)], 0.0)[0].same
+    assert lookalikes(bias, [Signature("a bug", "a loop", bias)], 0.0)
+    assert not lookalikes(bias, [Signature("a bug", "a loop", 1.1 * bias)], 0.0)
+
+
+SCENES = (reference_scene, three_pixel_scene, two_technique_scene)
+
+
+@pytest.mark.parametrize("make", SCENES, ids=lambda make: make.__name__)
+def test_the_kept_tables_are_those_of_the_zoo(make) -> None:
+    """Every bug's own loop and one frame, anew; the others are made by the same lines."""
+    scene = make()
+    tables = {(each.bug, each.loop): each.bias for each in known_signatures(scene, TOLERANCE)}
+    assert tables
+    for name in [*BUGS][::5]:
+        for loop, right, wrong in [*likeness.loops(BUGS[name])][1:2]:
+            bias = likeness._table(wrong, scene)
+            shown = abs(likeness._table(right, scene)).max() <= TOLERANCE < abs(bias).max()
+            assert ((name, loop) in tables) == shown, (name, loop)
+            if shown:
+                np.testing.assert_allclose(tables[name, loop], bias, atol=1e-12)
+
+
+def test_other_scenes_are_told_apart() -> None:
+    assert len({digest(make()) for make in SCENES}) == 3
+    assert digest(reference_scene()) == digest(reference_scene())
+
+
+def facts(bug: Bug, scene: Scene) -> Facts:
+    return facts_of(replace(bug.wrong, steps=one_frame)(scene), scene, 100_000)
+
+
+@pytest.mark.parametrize("name", [*BUGS][::4])
+def test_a_bug_is_among_those_that_need_what_it_needs(name) -> None:
+    found = facts(BUGS[name], BUGS[name].scene())
+    assert abs(found.bias).max() <= TOLERANCE or name in needing_the_same(found)
+
+
+def test_a_need_that_no_bug_has_names_none() -> None:
+    found = facts(BUGS["W clamped"], reference_scene())
+    assert needing_the_same(found) == ("W clamped",)
+    assert needing_the_same(replace(found, gone=("lit", "small W"))) == ()

@@ -7,8 +7,9 @@ Definition 4.1; docs/symptoms.md says which check catches which bug.
 """
 
 from restir_ref.oracle.zoo.bug import Bug, exact_bias, family, of
+from restir_ref.oracle.zoo.candidates import CANDIDATE_BUGS, WASTEFUL_CANDIDATES
 from restir_ref.oracle.zoo.checks import CHECKS, Case, Found, examine
-from restir_ref.oracle.zoo.confidence import CONFIDENCE_BUGS, null_confidence_zero
+from restir_ref.oracle.zoo.confidence import CONFIDENCE_BUGS, OneSeed, null_confidence_zero
 from restir_ref.oracle.zoo.inefficient import INEFFICIENT_BUGS
 from restir_ref.oracle.zoo.mutations import MUTATION_BUGS
 from restir_ref.oracle.zoo.passes import PASS_BUGS
@@ -16,8 +17,18 @@ from restir_ref.oracle.zoo.selection import SELECTION_BUGS
 from restir_ref.oracle.zoo.shifts import SHIFT_BUGS
 from restir_ref.oracle.zoo.weights import WEIGHT_BUGS, talbot_capped_below
 
-BUGS = family([*SHIFT_BUGS, *WEIGHT_BUGS, *PASS_BUGS, *SELECTION_BUGS, *CONFIDENCE_BUGS, *MUTATION_BUGS])
-INEFFICIENT = family(INEFFICIENT_BUGS)
+BUGS = family(
+    [
+        *SHIFT_BUGS,
+        *WEIGHT_BUGS,
+        *PASS_BUGS,
+        *SELECTION_BUGS,
+        *CONFIDENCE_BUGS,
+        *MUTATION_BUGS,
+        *CANDIDATE_BUGS,
+    ]
+)
+INEFFICIENT = family([*INEFFICIENT_BUGS, *WASTEFUL_CANDIDATES])
 
 __all__ = [
     "BUGS",
@@ -26,6 +37,7 @@ __all__ = [
     "Bug",
     "Case",
     "Found",
+    "OneSeed",
     "exact_bias",
     "examine",
     "family",

@@ -25,6 +25,60 @@ and a half times. *Image* is the relative bias of the pixel that is off most: ce
 hide each other there.
 """
 
+FIRST = """
+## First
+
+1. **Switch reuse off**, temporal and spatial, and take one candidate per pixel. If the image is still wrong, so is the
+   path tracer, the sampler or its pdf: no table below helps before that is right.
+2. **Is it biased at all?** `python -m restir_ref.audit images FRAMES REFERENCE` compares independent frames with a
+   reference, says where and by how much, or how many frames are missing. Noise is no bias, however ugly.
+3. **Which step?** Then switch on candidates, temporal, spatial reuse, one after the other, and compare each:
+   `python -m restir_ref.audit ladder REFERENCE "new samples=DIR" "temporal=DIR" "spatial=DIR"` names the first that is
+   wrong.
+4. **Which term?** Dump a few columns of that pass, and let them be recomputed; or write the pass down as an estimator:
+   [audit.md](audit.md). A shift of your own is for the [judge](audit.md#judge-a-shift).
+
+"""
+
+BEFORE = (
+    (
+        "black or white blocks that grow from frame to frame and never go",
+        "NaN or infinity, from 0/0 of a null sample; reuse spreads it",
+        "test the target and the sum before dividing; W = 0 where either is 0; drop W that is not finite",
+    ),
+    (
+        "fireflies that come and go with distance or exposure",
+        "half floats end at 65504 and lose everything below 6e-8",
+        "scale p_hat; store W as float, or its logarithm",
+    ),
+    (
+        "boiling: blotches that live for some frames, right in the mean",
+        "history of long confidence, few new samples",
+        "lower the cap; more candidates; [when reuse pays](when-reuse-pays.md)",
+    ),
+    (
+        "the same with colours that stay for ever",
+        "no cap at all",
+        "cap the confidence of history, c <- min(c, M_c)",
+    ),
+    (
+        "dark after some bounces, by a constant factor per bounce",
+        "roulette that is not divided by its probability",
+        "W /= q for the survivors",
+    ),
+    (
+        "lamps without area too dark",
+        "a delta light weighed against a density of directions",
+        "weight 1 for what only one technique can find",
+    ),
+    (
+        "as noisy with reuse as without it",
+        "every neighbour is refused, or the result is not written back",
+        "count the accepted neighbours; dump a pass",
+    ),
+)
+"""What is no member of the zoo: what it looks like, what it is, the cure."""
+
 SECTIONS = {
     "Dark": "Energy is lost and nowhere gained.",
     "Bright": "Energy is gained and nowhere lost.",
@@ -47,7 +101,7 @@ CHECKS_HEAD = """
 ## The checks
 
 Exact numbers from outside catch nearly everything on these scenes: Definition 4.1 per cell and the mean with f = 1
-every biased mistake, the mean with f = p_hat and the variance all but one, two passes that share a seed. What the mean
+every biased mistake, the mean with f = p_hat and the variance all but two, whose seeds coincide. What the mean
 of a real, noisy image would see is a matter of size: the column *image*, against the noise. The variance needs a right
 loop to compare with. The tables above name the other checks, which look inside and say where to search.
 
@@ -119,7 +173,8 @@ def page(bugs: Iterable[Bug]) -> str:
 
 def pieces(entries: list[Entry]) -> Iterator[str]:
     """The parts of the page in order."""
-    yield HEAD
+    yield HEAD + FIRST + row(["what it looks like", "what it is", "cure"]) + row(["---"] * 3)
+    yield from map(row, BEFORE)
     for title, about in SECTIONS.items():
         members = [each for each in entries if each.section == title]
         yield f"\n## {title}\n\n{about}\n"
