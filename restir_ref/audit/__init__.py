@@ -13,6 +13,7 @@ from restir_ref.audit.fields import BadDump
 from restir_ref.audit.golden import golden_vectors
 from restir_ref.audit.images import BadImages, ImageReport, audit_images, audit_ladder
 from restir_ref.audit.rehearsal import CannotAudit
+from restir_ref.audit.shift_table import TableReport, audit_shift_table
 
 __all__ = [
     "KNOWN",
@@ -22,9 +23,11 @@ __all__ = [
     "DumpReport",
     "EstimatorReport",
     "ImageReport",
+    "TableReport",
     "audit_dump",
     "audit_estimator",
     "audit_images",
     "audit_ladder",
+    "audit_shift_table",
     "golden_vectors",
 ]

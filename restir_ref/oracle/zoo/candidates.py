@@ -330,7 +330,7 @@ CANDIDATE_BUGS = (
     Bug(
         "small targets cut off",
         "To save shadow rays, candidates below an absolute brightness are dropped.",
-        "dark to black on dim surfaces, right on bright ones",
+        "dark to black on dim surfaces, right where there is much light",
         "[GRIS Eq. 1, 15]",
         reference_scene,
         right=TWO,
