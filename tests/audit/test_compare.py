@@ -117,9 +117,9 @@ def test_without_numbers_any_possible_input_may_be_selected_and_the_result_has_t
 
 @pytest.mark.parametrize(("s", "wrong"), [(0, []), (1, ["s"]), (2, [])])
 def test_on_a_boundary_both_sides_are_allowed_but_no_input_of_weight_zero(s, wrong) -> None:
-    """w = 1/3, 0, 1/3, and u just above 1/2."""
-    assert wrong_terms(by_hand([1, 0, 1], [1, 1, 1], u=0.5 + RTOL / 2, s=s)) == wrong
-    assert wrong_terms(by_hand([1, 0, 1], [1, 1, 1], u=0.5 + 2 * RTOL, s=s)) == ([] if s == 2 else ["s"])
+    """w = 1/3, 0, 1, and u just above 1/4; 1 - u would select the last one."""
+    assert wrong_terms(by_hand([1, 0, 3], [1, 1, 1], u=0.25 + RTOL / 2, s=s)) == wrong
+    assert wrong_terms(by_hand([1, 0, 3], [1, 1, 1], u=0.25 + 2 * RTOL, s=s)) == ([] if s == 2 else ["s"])
 
 
 @pytest.mark.parametrize("s", [0, 1])
