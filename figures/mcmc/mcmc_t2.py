@@ -120,7 +120,8 @@ def fallen(a: Arrays, view: str) -> Claim:
 def power(one: Array, other: Array) -> str:
     """What so many images can tell."""
     low, high, _ = criteria.ratio_interval(one, other)
-    return f"{len(one)} images leave {(high - low) / 2:.2f} of the ratio open: a few rare paths carry most of a covariance."
+    left = (high - low) / 2
+    return f"{len(one)} images leave {left:.2f} of the ratio open: a few rare paths carry most of a covariance."
 
 
 def driven(a: Arrays, view: str, k: str) -> Claim:
