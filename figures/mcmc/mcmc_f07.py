@@ -109,7 +109,17 @@ def check(a: Arrays) -> list[Claim]:
         *(red(a[f"{arm}.low"]) for arm in NAMES),
         less(a, none, five),
     ]
-    return [Claim(id_, *each[:1], part, each[1]) for (id_, part), each in zip(PARTS, outcomes, strict=True)]
+    claims = [Claim(id_, outcome, part, other) for (id_, part), (outcome, other) in zip(PARTS, outcomes, strict=True)]
+    return [
+        replace(each, reason=WHY.get(each.id, "") if each.outcome and each.outcome.passed is False else "")
+        for each in claims
+    ]
+
+
+WHY = {
+    "MCMC-T2": "104 images leave 0.17 of the ratio open; along x alone it is below 0.6.",
+    "MCMC-C04": "Fewer proposals are accepted behind the slit, but the intervals of the covariance overlap.",
+}
 
 
 PARTS = (

@@ -15,6 +15,7 @@ from benchmarks.jobs import (
     indirect_references,
     job,
     means,
+    mutations,
     offline,
     probes,
     references,
@@ -397,3 +398,16 @@ def test_baselines_run(name) -> None:
 def test_offline_frames_and_probes_run() -> None:
     assert offline.compute({"rule": "hybrid", "part": 0}, rng=np.random.default_rng(1))["frames"].shape == (8, 128)
     assert len(rows(probes.JOB, 0.001)) == 5 * len(probes.PROBES)
+
+
+def test_probes_of_mutations_run_and_their_truth_is_theirs(monkeypatch) -> None:
+    monkeypatch.setattr(mutations, "REPLICAS", 12)
+    monkeypatch.setattr(mutations, "lattice", lambda D: lattice(D)[:, ::64])
+    rng = np.random.default_rng(1)
+    found = mutations.compute({"of": "case", "case": "clear coat, lobe jumped", "part": 0}, rng=rng)
+    truth = mutations.compute({"of": "truth", "case": "clear_coat", "part": 0}, rng=rng)
+    right = joined([truth], "constant").mean.mean()
+    for stage in ("mutation", "spatial"):
+        assert joined([found], f"constant, {stage}").mean.mean() == pytest.approx(right, rel=0.1)
+    assert len(found) == 3 * 2 * len(mutations.PROBES)
+    assert {params["case"] for params in mutations.chunks(0.01)} == {*mutations.EVERY, *mutations.CHUNKS}

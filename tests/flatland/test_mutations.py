@@ -25,7 +25,17 @@ from restir_ref.transport.rays import arrive
 from restir_ref.transport.scene import Facet
 from restir_ref.transport.scene import scene as compiled
 from restir_ref.transport.vectors import norm, normalize
-from tests.transport.mutated import STEP, moves, over_areas, retraced_acceptance, reused, steep, tracer
+from tests.transport.mutated import (
+    STEP,
+    Moves,
+    measured_ratio,
+    moves,
+    over_areas,
+    retraced_acceptance,
+    reused,
+    steep,
+    tracer,
+)
 from tests.transport.paths import HYBRID
 from toy1d import three_channels, walking
 
@@ -69,6 +79,20 @@ def test_hit_points_are_as_dense_as_the_product_says(power, right) -> None:
     others = [N - each[kept].sum() for each in (counts, expected)]
     p_value = chisquare([*counts[kept], others[0]], [*expected[kept], others[1]]).pvalue
     assert bool(p_value > 1e-4) is right
+
+
+@pytest.mark.claims("MCMC-E10")
+@pytest.mark.parametrize("scene", ["matte_cornell", "ajar"])
+def test_the_ratio_of_transitions_is_that_of_finite_differences(scene) -> None:
+    """All walls are Lambert, so that what leaves x_(c+1) does not change with where it is seen from."""
+    of = TwoRays(tracer(scene), STEP)
+    X, here = reused(of, 6, seed=1)
+    m = moves(of, X, here, seed=2)
+    kept = np.flatnonzero((m.x.c <= m.x.k) & ~(m.x.nee & (m.x.c == m.x.k)) & steep(m, 0.02))
+    m = Moves(m.t, m.i[kept], take(m.x, kept), take(m.x_new, kept), m.T[kept])
+    assert len(kept) > 50
+    assert np.abs(measured_ratio(m) / m.T - 1).max() < 1e-3
+    assert np.abs(measured_ratio(m) * m.T - 1).max() > 0.1
 
 
 # ---------------------------------------------------------------- what changes with x_c

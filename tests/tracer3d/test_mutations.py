@@ -18,7 +18,7 @@ from restir_ref.transport.rays import arrive
 from restir_ref.transport.retracing import traced
 from restir_ref.transport.vectors import norm, normalize
 from tests.tracer3d.views import tracer
-from tests.transport.mutated import STEP, Moves, moves, over_areas, own, retraced_acceptance, steep
+from tests.transport.mutated import STEP, Moves, measured_ratio, moves, over_areas, own, retraced_acceptance, steep
 
 SCENES = ("cornell", "glossy_cornell", "ajar")
 
@@ -60,6 +60,15 @@ def test_squared_distances_are_needed_in_space() -> None:
     r, r_new = (norm(x.far_z - x.z) for x in (m.x, m.x_new))
     a = m.x_new.F.mean(axis=0) / m.x.F.mean(axis=0) * m.T * np.where(joined, r_new / r, 1)  # as in the plane
     assert np.median(np.abs(a / retraced_acceptance(m) - 1)[joined]) > 1e-3
+
+
+@pytest.mark.claims("MCMC-E10")
+def test_the_ratio_of_transitions_is_that_of_finite_differences() -> None:
+    m = moved("ajar")
+    kept = np.flatnonzero((m.x.c <= m.x.k) & ~(m.x.nee & (m.x.c == m.x.k)) & steep(m, 0.02))
+    m = Moves(m.t, m.i[kept], take(m.x, kept), take(m.x_new, kept), m.T[kept])
+    assert len(kept) > 50
+    assert np.abs(measured_ratio(m) / m.T - 1).max() < 1e-3
 
 
 # ---------------------------------------------------------------- densities per area

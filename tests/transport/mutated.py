@@ -13,8 +13,10 @@ from restir_ref.restir import initial, spatial
 from restir_ref.transport.mutations import ByNumbers, FarPath, TwoRays, far_record
 from restir_ref.transport.paths import Path, Tracer, leaves, trace
 from restir_ref.transport.proofs.reading import ExtendedPath, Factors, contribution, extended_path, factors
+from restir_ref.transport.rays import vertex
 from restir_ref.transport.record import record, record_from
-from restir_ref.transport.retracing import own_numbers
+from restir_ref.transport.retracing import direction_number, own_numbers
+from restir_ref.transport.vectors import normalize
 from tests.transport.paths import RULES
 
 PIXELS = 128
@@ -107,3 +109,27 @@ def same_fields(a: Path, b: Path, names=None) -> float:
     kept = names or [each.name for each in fields(Path) if each.name != "u"]
     pairs = [(np.asarray(getattr(a, name), float), np.asarray(getattr(b, name), float)) for name in kept]
     return max(float((np.abs(one - other) / (1 + np.abs(other))).max(initial=0)) for one, other in pairs)
+
+
+def measured_ratio(m: Moves, h: float = 1e-6) -> Array:
+    """|du' / du| of the numbers u of the direction from x_c to x_(c+1), as x_(c+1) moves over its facet and x_c rests.
+
+    By central differences of inverted directions; columns must be joined to x_(c+1), on a facet.
+    """
+    s = m.t.scene
+    first, *others = (corner.take(m.x.far_prim, axis=-1) for corner in s.corners)
+    edges = [other - first for other in others]
+    found = []
+    for x in (m.x, m.x_new):
+        z = vertex(s, x.z, x.prim, -normalize(x.z - start(m, x)))
+        sides = [[normalize(x.far_z + by * edge - z.x) for by in (h, -h)] for edge in edges]
+        ends = [[direction_number(m.t, z, x.lobe_out, w) for w in pair] for pair in sides]
+        matrix = np.stack([(one - other) / (2 * h) for one, other in ends])
+        found.append(np.abs(np.linalg.det(np.moveaxis(matrix, -1, 0))))
+    return found[1] / found[0]
+
+
+def start(m: Moves, x: Path) -> Array:
+    """x_(c-1), (d, N)."""
+    path = extended_path(m.t, own(m.t, x, m.i), m.i, x.k, x.nee)
+    return np.stack([path.x[c - 1, :, n] for n, c in enumerate(x.c.tolist())]).T
