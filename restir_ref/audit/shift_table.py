@@ -101,7 +101,7 @@ def slopes(x: Array, y: Array, J: Array) -> Law:
     d, k = len(x), 2 * len(x) + 3
     if len(rows) < k:
         return Law("slope", 0, 0, (0, 0.0, 0.0))
-    distance, near = cKDTree(x[:, rows].T).query(x[:, rows].T, k)
+    distance, near = (np.asarray(each) for each in cKDTree(x[:, rows].T).query(x[:, rows].T, k))
     around = rows[near[:, 1:]]
     dx = x[:, around] - x[:, rows][..., None]
     dy = y[:, around] - y[:, rows][..., None]
