@@ -1,19 +1,24 @@
 """How often the audits accuse somebody right, and how often they find what was planted: slow, run by hand.
 
-`python benchmarks/audit_rates.py passes 1000 | images 1000 | estimators 100 | fuzz 5000 | blind 30`
+`python benchmarks/audit_rates.py passes 1000 | images 1000 | estimators 100 | fuzz 5000 | blind 30 | zoo 50`
 """
 
 import sys
 import tempfile
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from restir_ref.audit import BadDump, audit_dump, audit_estimator, audit_images
+from restir_ref.audit.estimator import TOLERANCE, facts_of
+from restir_ref.audit.known import needing_the_same
+from restir_ref.audit.likeness import FEW_LEAVES, OTHER_LOOPS
 from restir_ref.mis import ALL_CANONICAL, WEIGHTS
 from restir_ref.oracle.scenes import random_scene, reference_scene, spatial_loop, three_pixel_scene, two_frame_loop
+from restir_ref.oracle.zoo import BUGS
 from tests.audit.corrupted import BASES, FAMILIES, one_of
 from tests.audit.planted import PLANTED
 from tests.audit.shader import dumped
@@ -83,7 +88,24 @@ def blind(count: int) -> str:
     return f"{named} of {count} named, {other} named wrongly, {silent} only located"
 
 
-JOBS = {job.__name__: job for job in (passes, estimators, images, fuzz, blind)}
+def zoo(count: int) -> str:
+    """Bugs of the zoo in random loops on random scenes, where nothing is kept: named, others named, or none named."""
+    rng, found = np.random.default_rng(int(time.time())), Counter[str]()
+    while found.total() < count:
+        bug = BUGS[str(rng.choice([*BUGS]))]
+        steps = [*OTHER_LOOPS.values()][int(rng.integers(len(OTHER_LOOPS)))]
+        scene = random_scene(bug.scene(), rng=rng)
+        try:
+            facts = facts_of(replace(bug.wrong, steps=steps)(scene), scene, FEW_LEAVES)
+        except ValueError:
+            continue
+        if abs(facts.bias).max() > TOLERANCE:
+            kin = needing_the_same(facts)
+            found["named" if bug.name in kin else "others named" if kin else "none named"] += 1
+    return f"{dict(found)} of {count}"
+
+
+JOBS = {job.__name__: job for job in (passes, estimators, images, fuzz, blind, zoo)}
 
 if __name__ == "__main__":
     start = time.process_time()

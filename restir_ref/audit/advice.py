@@ -67,8 +67,8 @@ def coins(facts: Facts) -> list[Draw]:
 
 
 def own_draw_only(facts: Facts) -> bool:
-    """Neither other pixels nor earlier frames enter."""
-    return not (facts.neighbours or facts.history)
+    """Neither other pixels nor earlier frames enter, as far as that was tried."""
+    return bool(facts.gone or facts.stays) and not (facts.neighbours or facts.history)
 
 
 def needs(*names: str) -> Callable[[Facts], bool]:
@@ -275,7 +275,7 @@ def steps(facts: Facts) -> list[Draw]:
 
 def merges(facts: Facts) -> bool:
     """Samples of others enter."""
-    return not own_draw_only(facts)
+    return facts.neighbours or facts.history
 
 
 def _both(*conditions: Callable[[Facts], bool]) -> Callable[[Facts], bool]:

@@ -13,13 +13,14 @@ import numpy as np
 from restir_ref.batch import Array
 from restir_ref.mis import WEIGHTS
 from restir_ref.oracle.laws import bias_per_cell, expected_weight
-from restir_ref.oracle.scenes import Parts, Scene, no_motion, one_frame, temporal_only, two_rounds
+from restir_ref.oracle.scenes import Parts, Scene, new_samples, no_motion, one_frame, temporal_only, two_rounds
 from restir_ref.oracle.zoo import BUGS, Bug
 
 FEW_LEAVES = 100_000
 """Bugs whose enumeration is larger on this scene are not compared."""
 
 OTHER_LOOPS = {
+    "new samples only": new_samples,
     "one frame": one_frame,
     "temporal only": temporal_only,
     "two rounds": two_rounds,

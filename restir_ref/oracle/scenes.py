@@ -149,6 +149,17 @@ def one_frame(parts: "Parts", scene: Scene) -> Loop:
     return loop
 
 
+def new_samples(parts: "Parts", scene: Scene) -> Loop:
+    """New samples and nothing else."""
+    now = scene.made_of(parts.here).now
+
+    def loop(index: Array, chance: Chance) -> Reservoirs:
+        here = Pixels(now, index)
+        return parts.edit(parts.draw(here, chance), here)
+
+    return loop
+
+
 def temporal_only(parts: "Parts", scene: Scene) -> Loop:
     """New samples of two frames, merged once: no spatial reuse; pixels move by one."""
     before, now = scene.made_of(parts.here).frames

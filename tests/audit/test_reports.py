@@ -39,6 +39,20 @@ def test_a_reported_bug_needs_what_it_needs(name) -> None:
     assert set(REPORTS[name].stays) <= set(said.stays)
 
 
+TABLES = {
+    "dim surfaces drift to black": "small targets cut off",
+    "the sky twice as bright on rough surfaces": "both techniques added in full",
+    "half of the light is missing": "partner never sampled",
+    "everything a little too dark": "everything faded",
+    "the first light too bright, the others too dark": "sampler one entry off",
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_what_the_zoo_has_exactly_is_named(name) -> None:
+    assert TABLES[name] in [each.bug for each in answer(name).lookalikes]
+
+
 @every_report
 def test_the_answer_stands_before_the_numbers(name) -> None:
     first, second, *_ = str(answer(name)).splitlines()
@@ -155,3 +169,4 @@ def test_estimators_with_many_outcomes_are_not_run_again_and_say_so(monkeypatch)
     assert FEW_TO_RERUN > 10
     assert "more than 10 outcomes: not run again on changed scenes" in str(report)
     assert (report.needs, report.stays) == ((), ())
+    assert "no other pixel" not in str(report)
