@@ -114,6 +114,15 @@ def test_noise_is_not_called_a_bias(noise) -> None:
         assert not audit_images(TRUTH * NOISES[noise](rng, (64, H, W)), TRUTH).biased
 
 
+def test_a_pixel_that_no_frame_has_found_yet_is_as_uncertain_as_its_neighbours() -> None:
+    """Light that one sample in five finds: 64 frames miss it once in a million pixels, without any variance."""
+    frames = TRUTH * NOISES["rare"](np.random.default_rng(1), (64, H, W))
+    frames[:, 16, 18] = 0
+    report = audit_images(frames, TRUTH)
+    assert not report.biased
+    assert 3 < abs(report.families[0].z[0, 16 * W + 18]) < 5
+
+
 def test_the_reference_s_own_noise_is_not_called_a_bias() -> None:
     rng = np.random.default_rng(17)
     renderings = [TRUTH * rng.gamma(2, 0.5, (H, W)) for _ in range(64)]
