@@ -70,6 +70,11 @@ STEPS = {"row step": "row", "column step": "column"}
 """Families of differences between a unit and the next one: what one pixel loses its neighbour gains."""
 
 
+def steps(families: Units) -> dict[str, str]:
+    """The steps that there are: images of one row have none between rows."""
+    return {step: of for step, of in STEPS.items() if families[of].max() > 0}
+
+
 def edges(reference: Array) -> Array:
     """0 for the tenth of the pixels between the most different neighbours, 1 elsewhere; (H, W).
 
@@ -344,7 +349,7 @@ def audit_images(
 def means_of(image: Array, families: Units) -> dict[str, Array]:
     """The means over all units, and their steps; (C, units) each."""
     means = {name: averaged(image, unit) for name, unit in families.items()}
-    return {**means, **{step: np.diff(means[of], axis=1) for step, of in STEPS.items()}}
+    return {**means, **{step: np.diff(means[of], axis=1) for step, of in steps(families).items()}}
 
 
 def stated(relative: float, truth: Array, families: Units) -> dict[str, Array]:
@@ -353,8 +358,8 @@ def stated(relative: float, truth: Array, families: Units) -> dict[str, Array]:
     for name, unit in families.items():
         count = np.maximum(np.bincount(unit.ravel()), 1)
         error[name] = np.sqrt(averaged(error["pixel"] ** 2, unit) / count)
-    steps = {step: np.hypot(error[of][:, 1:], error[of][:, :-1]) for step, of in STEPS.items()}
-    return {**error, **steps}
+    between = {step: np.hypot(error[of][:, 1:], error[of][:, :-1]) for step, of in steps(families).items()}
+    return {**error, **between}
 
 
 def planes(image: Array) -> Array:
@@ -380,7 +385,7 @@ def _compared(
     frames: Iterable[Array], truth: Array, families: Units, noise: Mapping[str, Array], eps: float
 ) -> ImageReport:
     """All frames, one after the other."""
-    sums = {name: Moments() for name in ("pixel", *families, *STEPS)}
+    sums = {name: Moments() for name in ("pixel", *families, *steps(families))}
     halves = [np.zeros(truth.shape), np.zeros(truth.shape)]
     in_tiles: list[Array] = []
     count = 0
@@ -403,7 +408,7 @@ def _compared(
     r = correlation(np.array(in_tiles))
     inflation = (1 + r) / (1 - r) if r > CORRELATED else 1.0
     light = {"pixel": truth, **{name: averaged(truth, unit) for name, unit in families.items()}}
-    light |= {step: np.maximum(light[of][:, 1:], light[of][:, :-1]) for step, of in STEPS.items()}
+    light |= {step: np.maximum(light[of][:, 1:], light[of][:, :-1]) for step, of in steps(families).items()}
     level = FALSE_ALARM / (MARGIN * (len(sums) + 1))
     results = []
     for name, moments in sums.items():

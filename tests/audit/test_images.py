@@ -163,6 +163,12 @@ def test_a_pixel_s_own_value_does_not_make_it_an_edge() -> None:
     assert edges(lone)[4, 4] == 1
 
 
+def test_an_image_of_one_row_is_an_image() -> None:
+    frames = rendered(edge(), 0.1, 64, 0)[:, :1]
+    assert "column 11" in audit_images(frames, TRUTH[:1]).answer
+    assert not audit_images(rendered(1.0, 0.1, 64, 0)[:, :1], TRUTH[:1]).biased
+
+
 def test_places_are_said_in_words() -> None:
     assert place("pixel", 25, (1, H, W)) == "pixel (row 1, column 1)"
     assert place("tile", 4, (1, H, W)) == "tile of rows 8 to 15, columns 8 to 15"
