@@ -114,6 +114,15 @@ def test_noise_is_not_called_a_bias(noise) -> None:
         assert not audit_images(TRUTH * NOISES[noise](rng, (64, H, W)), TRUTH).biased
 
 
+def test_a_pixel_that_no_frame_has_found_yet_is_as_uncertain_as_its_neighbours() -> None:
+    """Light that one sample in five finds: 64 frames miss it once in a million pixels, without any variance."""
+    frames = TRUTH * NOISES["rare"](np.random.default_rng(1), (64, H, W))
+    frames[:, 16, 18] = 0
+    report = audit_images(frames, TRUTH)
+    assert not report.biased
+    assert 3 < abs(report.families[0].z[0, 16 * W + 18]) < 5
+
+
 def test_the_reference_s_own_noise_is_not_called_a_bias() -> None:
     rng = np.random.default_rng(17)
     renderings = [TRUTH * rng.gamma(2, 0.5, (H, W)) for _ in range(64)]
@@ -152,6 +161,12 @@ def test_a_pixel_s_own_value_does_not_make_it_an_edge() -> None:
     lone = np.ones((1, 9, 9))
     lone[0, 4, 4] = 5
     assert edges(lone)[4, 4] == 1
+
+
+def test_an_image_of_one_row_is_an_image() -> None:
+    frames = rendered(edge(), 0.1, 64, 0)[:, :1]
+    assert "column 11" in audit_images(frames, TRUTH[:1]).answer
+    assert not audit_images(rendered(1.0, 0.1, 64, 0)[:, :1], TRUTH[:1]).biased
 
 
 def test_places_are_said_in_words() -> None:
