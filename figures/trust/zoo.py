@@ -293,7 +293,7 @@ FIGURE = Figure(
     source="[GRIS 4-6, App. A]",
     claims=("GRIS-C19", "GRIS-A18", "GRIS-E07"),
     presets={
-        "quick": {"blocks": 4, "scenes": 5, "replicas": 2000},
+        "quick": {"blocks": 3, "scenes": 3, "replicas": 2000},
         "paper": {"blocks": 20, "scenes": 20, "replicas": 5000},
     },
     chunks=chunks,
