@@ -231,7 +231,7 @@ def draw(a: Arrays) -> "Picture":
         errors = np.sort(abs(a[f"{ROW_VIEW}.{method}.dx"] - np.diff(a["reference"])).ravel())[::-1]
         share = np.arange(1, len(errors) + 1) / len(errors)
         right.loglog(errors, share, **style.look(method, marker=""))
-    right.axhline(1 - HIGHEST / 100, color=style.GREY, linewidth=0.8)
+    right.axhline(1 - HIGHEST / 100, color=style.GREY, linewidth=0.8, marker="", label=f"{HIGHEST}th percentile")
     right.set(xlabel="|error of dx| (radiance)", ylabel="share of differences above", title="occluder row: outliers")
     right.legend()
     return picture
@@ -243,7 +243,7 @@ def spectra(axis: Any, a: Arrays) -> None:
     for name, images in (("primal", a[f"{ROW_VIEW}.with.primal"]), ("Poisson L2", rebuilt_row(a, l2))):
         power = (abs(np.fft.rfft(images - images.mean(axis=0))[:, 1:]) ** 2).mean(axis=0) / images.shape[1]
         axis.loglog(k, power, **style.look(name, marker=""))
-    axis.axvline(ALPHA / (2 * np.pi), color=style.GREY, linewidth=0.8)
+    axis.axvline(ALPHA / (2 * np.pi), color=style.GREY, linewidth=0.8, marker="", label="alpha")
     axis.set(xlabel="frequency (cycles per pixel)", ylabel="power of the noise (radiance$^2$)", title="occluder row")
     axis.legend()
 

@@ -142,6 +142,7 @@ def draw(a: Arrays) -> "Picture":
             axis.loglog(*a[f"{view}.{method}.curve"], **style.look(method))
         axis.axvline(same_time(a, view), color=style.GREY, lw=1, ls=":", marker="", label=SAME_TIME)
         axis.set(xlabel="rays per pixel", ylabel="MAPE", title=view)
+        axis.tick_params(axis="x", which="minor", labelbottom=False)
     picture.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     _bars(axes.ravel()[len(views)], a, views)
     for axis in axes.ravel()[len(views) + 1 :]:

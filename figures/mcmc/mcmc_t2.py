@@ -178,7 +178,7 @@ def draw(a: Arrays) -> "Picture":
     ):
         for n, view in enumerate(VIEWS):
             over_k(axis, a, view, what, n)
-        axis.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="no mutations")
+        axis.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="as without")
         axis.set(xlabel="mutations $k$ per frame", ylabel="relative to $k$ = 0 (bars: 95%)", title=title)
         axis.set_xscale("symlog", linthresh=1)
         axis.set_xticks([0, 1, 5, 20], ["0", "1", "5", "20"])
@@ -226,7 +226,7 @@ def ways(axis: "Axes", a: Arrays) -> None:
         place = [views.index(view) + 0.27 * (n - 1) for view in shown_]
         look: dict[str, Any] = {"color": style.COLOURS[n + 4], "hatch": style.HATCHES[n], "edgecolor": style.PAPER}
         axis.bar(place, middle, 0.25, yerr=[middle - low, high - middle], error_kw={"lw": 0.8}, label=name, **look)
-    axis.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="no mutations")
+    axis.axhline(1, color=style.INK, lw=1, ls=":", marker="", label="as without")
     axis.set_xticks(range(len(views)), [view.replace(", ", ",\n").replace("whole film", "film") for view in views])
     axis.grid(visible=False, axis="x")
     axis.set(yscale="log", ylabel="relative to $k$ = 0 (bars: 95%)", title="Covariance, five mutations in three ways")

@@ -143,7 +143,7 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
         # pixels of a pair, and their difference
         "$f_1$": Look(GREEN, "v", "-", ""),
         "$f_2$": Look(PURPLE, "P", "--", ""),
-        "after": Look(SKY, "s", "--", "//"),
+        "after": Look(SKY, "s", "--", "++"),
         "with": Look(BLUE, "o", "-", ""),
         "positivized": Look(INK, "^", "-.", ".."),
         "image alone": Look(GREEN, "v", LINES[4], "xx"),
