@@ -26,7 +26,7 @@ HYPOTHESIS_PROFILE ?= ci
 export HYPOTHESIS_PROFILE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup figures figures-paper test lint audit check notebooks notebook-pages evidence bench clean
+.PHONY: help setup figures figures-paper test test-lowest dist lint audit check notebooks notebook-pages evidence bench clean
 
 help:  ## list the targets
 	@echo 'usage: make TARGET [ARGS="..."] [JOBS=2] [OUT=out] [PYTHON=python3]'
@@ -46,6 +46,13 @@ figures-paper: $(STAMP)  ## the same at the papers' sample counts, into out-pape
 
 test: $(STAMP)  ## run the laws; ARGS="-k name" runs some
 	$(PY) -m pytest -n $(JOBS) --dist worksteal $(ARGS)
+
+test-lowest: $(VENV)-lowest/.installed  ## the same with the lowest versions that pyproject.toml allows
+	$(VENV)-lowest/bin/python -m pytest -n $(JOBS) --dist worksteal $(ARGS)
+
+dist: $(STAMP)  ## build the two archives into dist/, and check them
+	$(PY) -m hatchling build --clean
+	$(PY) -m pytest tests/test_release.py -q
 
 lint: $(STAMP)  ## ruff and mypy --strict
 	$(PY) -m ruff check
@@ -104,8 +111,20 @@ $(STAMP): pyproject.toml constraints.txt
 	    $(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); echo "$$NO_VENV" >&2; exit 1; }; }
 	@echo 'Installing the pinned packages into $(VENV); the first time takes about a minute.'
 	@$(PY) -m pip install -qq --upgrade pip
-	@$(PY) -m pip install -qq -c constraints.txt -e '.[dev]'
+	@$(PY) -m pip install -qq -c constraints.txt -e . --group dev
 	@$(PY) -m pip install -qq -c constraints.txt -e '.[reference]' || { test -z "$$CI" && echo "$$NO_WITNESS" >&2; }
+	@touch $@
+
+# Beside .venv, so that both stay whole.  The bounds of `dependencies` become pins, the other pins stay.
+LOWEST := import re, tomllib; \
+    bounds = tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"]; \
+    print(*(bound.replace(">=", "==") for bound in bounds), sep="\n")
+
+$(VENV)-lowest/.installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-lowest || { rm -rf $(VENV)-lowest; echo "$$NO_VENV" >&2; exit 1; }
+	@$(VENV)-lowest/bin/python -m pip install -qq --upgrade pip
+	@$(VENV)-lowest/bin/python -c '$(LOWEST)' > $(VENV)-lowest/lowest.txt
+	@$(VENV)-lowest/bin/python -m pip install -qq -c $(VENV)-lowest/lowest.txt -e . --group test
 	@touch $@
 
 $(STAMP)-notebooks: $(STAMP)

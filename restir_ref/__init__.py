@@ -12,6 +12,8 @@ from restir_ref.mis import WEIGHTS, Weights
 from restir_ref.resampling import Input, gris, select, weigh
 from restir_ref.restir import initial, reuse_all, shade, spatial, temporal
 
+__version__ = "0.1.0"
+
 __all__ = [
     "NOWHERE",
     "WEIGHTS",
@@ -23,6 +25,7 @@ __all__ = [
     "Reservoirs",
     "Shifted",
     "Weights",
+    "__version__",
     "gris",
     "initial",
     "reuse_all",

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 WORLDS = ("toy1d", "flatland2d", "tracer3d")
-MADE = re.compile(r"\.(?!ci$)|__pycache__$|build$|dist$|out$|out-|.*\.egg-info$")
+MADE = re.compile(r"\.(?!ci$|github$)|__pycache__$|build$|dist$|out$|out-|.*\.egg-info$")
 
 
 class Module(NamedTuple):

@@ -57,10 +57,10 @@ def test_an_innocent_slash_is_left_alone(tmp_path, innocent):
 
 
 def named_requirements(pyproject: dict[str, Any]) -> list[Requirement]:
-    """Everything pyproject.toml asks for: to build, to run, and as extras."""
-    extras = pyproject["project"]["optional-dependencies"].values()
-    groups = (pyproject["build-system"]["requires"], pyproject["project"]["dependencies"], *extras)
-    return [Requirement(line) for group in groups for line in group]
+    """Everything pyproject.toml asks for: to build, to run, as extras and in groups."""
+    named = (*pyproject["project"]["optional-dependencies"].values(), *pyproject["dependency-groups"].values())
+    groups = (pyproject["build-system"]["requires"], pyproject["project"]["dependencies"], *named)
+    return [Requirement(line) for group in groups for line in group if isinstance(line, str)]
 
 
 def closure(requirements: Iterable[Requirement]) -> set[str]:

@@ -15,6 +15,7 @@ from restir_ref.audit.chain import chained
 from restir_ref.audit.commands import Command, images_command, ladder_command
 from restir_ref.audit.dump import RTOL, audit_dump
 from restir_ref.audit.fields import BadDump
+from restir_ref.audit.pages import page
 from restir_ref.audit.schema import schema
 
 COMMANDS: Mapping[str, Command] = MappingProxyType({"images": images_command, "ladder": ladder_command})
@@ -34,9 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _dumps(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m restir_ref.audit",
-        description="Recompute a dumped resampling pass and name the first wrong term. docs/audit.md has the format. "
-        "Of several dumps, each is the input of the next. Other commands: images, ladder, schema.",
-        epilog="exit status: 0 if every dumped term is right, 1 if one is wrong, 2 if the dump cannot be read",
+        description="Recompute a dumped resampling pass and name the first wrong term. Of several dumps, each is the "
+        "input of the next. Other commands: images, ladder, schema (the format, for programs).",
+        epilog="exit status: 0 if every dumped term is right, 1 if one is wrong, 2 if the dump cannot be read. "
+        f"The format, for people: {page('audit.md')}; other pages named docs/... lie beside it.",
     )
     parser.add_argument("dump", metavar="DUMP", nargs="+", help="a .npz archive, a .json or a .csv file")
     parser.add_argument("--rtol", type=float, default=RTOL, help="relative tolerance (default: %(default)s)")
