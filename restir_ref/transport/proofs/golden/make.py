@@ -1,0 +1,264 @@
+"""From sketches to files: columns far from every boundary, their terms, and tolerances measured by perturbation."""
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import permutations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from restir_ref.batch import Array, entry, take
+from restir_ref.chance import Chance, Live
+from restir_ref.transport.paths import Tracer, leaves, trace
+from restir_ref.transport.proofs.golden import margins
+from restir_ref.transport.proofs.golden.sketch import Sketch, not_float32
+from restir_ref.transport.proofs.golden.terms import (
+    Chosen,
+    first_points,
+    moving,
+    numbers,
+    records,
+    terms,
+    turned,
+)
+from restir_ref.transport.rays import arrive
+from restir_ref.transport.shifts import replay
+from restir_ref.transport.space import Space
+from restir_ref.transport.vectors import dot
+
+FORMAT, VERSION = "restir-ref golden paths", 1
+
+SEED = 20220701
+POOL = 4096
+"""Candidates of which a file keeps those far from boundaries."""
+
+PATHS, SHIFTS, PASSES = 12, 24, 12
+"""How many of them it keeps, of each scene."""
+
+MARGIN = 2.0**-8
+"""Least margin of what is kept: some thousand times the rounding of float32."""
+
+GRAIN = 2.0**-16
+"""Primary numbers are multiples of this, so that they are the same in float32."""
+
+UNIT = {"float32": 2.0**-24, "float64": 2.0**-53}
+"""Relative error of one operation."""
+
+OPERATIONS = 64
+"""So many roundings of inputs and results are allowed for."""
+
+
+def vectors(sketches: Sequence[Sketch], space: Space) -> dict[str, Any]:
+    """What a file holds.  Raises ValueError for a sketch with numbers that float32 does not have."""
+    chance = Live(np.random.default_rng(SEED))
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "d": space.d,
+        "margin": MARGIN,
+        "scenes": [vector(sketch, space, chance) for sketch in sketches],
+    }
+
+
+def vector(sketch: Sketch, space: Space, chance: Chance) -> dict[str, Any]:
+    """One scene with its inputs, expected terms and tolerances."""
+    described = sketch.described()
+    if odd := not_float32(described):
+        raise ValueError(f"{sketch.name}: float32 has no {', '.join(odd)}; take multiples of a power of two.")
+    t = sketch.tracer(space)
+    chosen = choose(t, chance)
+    expected = terms(t, chosen)
+    return {
+        "name": sketch.name,
+        "about": sketch.about,
+        "scene": described,
+        "inputs": {
+            name: getattr(chosen, name) for name in ("u", "pixel", "path", "k", "nee", "to", "passes", "mutated")
+        },
+        "expected": expected,
+        "tolerance": tolerances(sketch, space, chosen, expected),
+    }
+
+
+# ---------------------------------------------------------------- columns beyond doubt
+
+
+def choose(t: Tracer, chance: Chance) -> Chosen:
+    """Paths that stay in the scene, shifts of theirs, and passes over three of these, all far from every boundary."""
+    u = np.floor(chance.uniform((t.D, POOL)) / GRAIN) * GRAIN
+    pixel = np.arange(POOL) % t.sensor.n
+    clear = np.flatnonzero(margin_of_paths(t, u, pixel) > MARGIN)
+    found = [F.any(axis=0) for _, nee, F in leaves(trace(t, u[:, clear], pixel[clear])) if not nee]
+    kept = mixed(clear, np.any(found, axis=0), PATHS)  # half of them meet a light
+    u, pixel = u[:, kept], pixel[kept]
+    every = every_shift(t, u, pixel)
+    clear = np.flatnonzero(margin_of_shifts(t, every) > MARGIN)
+    spread = clear[np.argsort(clear * 0.618034 % 1, kind="stable")]  # over paths, leaves and pixels
+    some = mixed(spread, every.nee[spread] == 0, SHIFTS)
+    shifts = Chosen(u, pixel, *(part[some] for part in (every.path, every.k, every.nee, every.to)))
+    return replace(shifts, passes=clear_passes(t, shifts), mutated=clear_mutations(t, shifts))
+
+
+def mixed(columns: Array, rare: Array, count: int) -> Array:
+    """`count` of the columns, half of them rare ones as far as there are so many, in their order."""
+    first = columns[rare][: count // 2]
+    return np.concatenate([first, columns[~rare][: count - len(first)]])
+
+
+def every_shift(t: Tracer, u: Array, pixel: Array) -> Chosen:
+    """Every lit leaf of every path into every other pixel."""
+    lit = [(path, k, int(nee)) for k, nee, F in leaves(trace(t, u, pixel)) for path in np.flatnonzero(F.any(axis=0))]
+    path, k, nee = (np.array(column) for column in zip(*lit, strict=True))
+    turns = [(pixel[path] + 1 + turn) % t.sensor.n for turn in range(t.sensor.n - 1)]
+    return Chosen(u, pixel, *(np.tile(part, len(turns)) for part in (path, k, nee)), np.concatenate(turns))
+
+
+def clear_passes(t: Tracer, s: Chosen) -> Array:
+    """Three base paths each, of which every shift into the pixel of another is clear: (3, passes)."""
+    M, n = len(s.to), t.sensor.n
+    shift, to = np.divmod(np.arange(M * n), n)
+    own = s.pixel[s.path]
+    margin = np.where(own[shift] == to, np.inf, margin_of_shifts(t, s.shifted(shift, to))).reshape(M, n)
+    triples = np.array(list(permutations(range(M), 3))).T
+    pixels = own[triples]
+    clear = np.array([margin[triples[i], pixels[j]] > MARGIN for i in range(3) for j in range(3)]).all(axis=0)
+    different = (pixels[0] != pixels[1]) & (pixels[0] != pixels[2]) & (pixels[1] != pixels[2])
+    found = np.flatnonzero(clear & different)
+    return triples[:, found[np.argsort(found * 0.618034 % 1, kind="stable")][:PASSES]]
+
+
+def clear_mutations(t: Tracer, s: Chosen) -> Array:
+    """Shifts whose base paths' mutations are clear: the new ray, sides, and what joins x_(c+1), (.,)."""
+    x, still = moving(t, s)
+    w = turned(t, x, still.at)
+    z, r, met = arrive(t.scene, still.at.v.x, w)
+    rules = abs(r / t.rule.distance - 1) if t.rule.distance > 0 else r
+    margin = margins.least([margins.of_rays(t.scene, still.at.v.x, z.x), rules, abs(dot(still.at.v.n, w)), z.o[-1]])
+    joins = (x.c <= x.k) & ~(x.nee & (x.c == x.k))
+    far = margins.of_connections(t, z, np.where(joins, x.far_z, z.x + w), np.where(joins, x.far_prim, z.prim))
+    lit = (x.nee > 0) & (x.c == x.k)
+    margin = np.where(joins, np.minimum(margin, far), np.where(lit, 0, margin))
+    return np.asarray(still.columns[(margin > MARGIN) & met])
+
+
+def margin_of_paths(t: Tracer, u: Array, pixel: Array) -> Array:
+    """Least margin of a whole tree, 0 where it leaves the scene or goes dark; (N,)."""
+    tree = trace(t, u, pixel)
+    way, lights = margins.of_trees(t, tree, first_points(t, pixel))
+    alive = tree.T[-1].any(axis=0)
+    return np.asarray(np.where(alive, np.minimum(way.min(axis=0), lights.min(axis=0)), 0))
+
+
+def margin_of_shifts(t: Tracer, s: Chosen) -> Array:
+    """Least margin of what shifts decide: the offset path up to its last replayed vertex, and its connection; (M,)."""
+    x = records(t, s)
+    there = trace(t, s.u[:, s.path], s.to)
+    way, lights = margins.of_trees(t, there, first_points(t, s.to))
+    last = np.where(x.c > 0, x.c - 1, np.where(x.nee > 0, x.k, x.k + 1))
+    upto = np.minimum.accumulate(np.minimum(way, margins.of_pairs(t, there)), axis=0)
+    found = [entry(upto, last - 1), np.where(x.nee > 0, entry(lights, np.maximum(x.k, 1)), np.inf)]
+    joined = np.full(len(x.c), np.inf)
+    for i in range(1, t.depth + 1):
+        c = np.flatnonzero(x.c == i + 1)
+        joined[c] = margins.of_connections(t, take(there.x[i - 1], c), x.z[:, c], x.prim[c])
+    alive = replay(t, x, s.to).legal
+    return np.where(alive, margins.least([*found, joined]), 0)
+
+
+# ---------------------------------------------------------------- tolerances
+
+
+def tolerances(sketch: Sketch, space: Space, chosen: Chosen, expected: Mapping[str, Any]) -> dict[str, Any]:
+    """Per kind of arithmetic and term: how much results move when every input moves by one rounding, times OPERATIONS.
+
+    |got - want| <= tolerance * (|want| + mean |want|) is asked, the mean over the whole array.
+    """
+    step = 2.0**-30
+    rng = np.random.default_rng(SEED + 1)
+    want, worst = numbers(expected), {}
+    for _ in range(8):
+        moved, there = moved_by(sketch, step, rng), chosen.u * (1 + step * rng.uniform(-1, 1, chosen.u.shape))
+        got = numbers(terms(moved.tracer(space), replace(chosen, u=np.minimum(there, 1 - step))))
+        for name, values in want.items():
+            if values.dtype.kind == "f" and values.size:
+                size = np.abs(values) + np.abs(values).mean()
+                error = np.divide(np.abs(got[name] - values), size, out=np.zeros(values.shape), where=size > 0)
+                worst[name] = max(worst.get(name, 0.0), float(error.max(initial=0)))
+    return {
+        kind: {name: float(f"{OPERATIONS * unit * max(error / step, 1):.1e}") for name, error in worst.items()}
+        for kind, unit in UNIT.items()
+    }
+
+
+def moved_by(sketch: Sketch, step: float, rng: np.random.Generator) -> Sketch:
+    """The same scene with every coordinate moved by that share of itself."""
+
+    def moved(x: Sequence[float]) -> list[float]:
+        return [float(each * (1 + step * sign)) for each, sign in zip(x, rng.uniform(-1, 1, len(x)), strict=True)]
+
+    return replace(
+        sketch,
+        facets=[replace(each, corners=[moved(corner) for corner in each.corners]) for each in sketch.facets],
+        balls=[replace(each, centre=moved(each.centre)) for each in sketch.balls],
+        eyes=[(moved(start), moved(at)) for start, at in sketch.eyes],
+    )
+
+
+# ---------------------------------------------------------------- files
+
+
+def text(value: Any, indent: str = "") -> str:
+    """JSON with a line per field; arrays on one line each, numbers with 15 digits."""
+    if isinstance(value, Mapping):
+        inner = indent + " "
+        lines = [f"{inner}{json.dumps(name)}: {text(each, inner)}" for name, each in value.items()]
+        return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+    if isinstance(value, list) and value and isinstance(value[0], Mapping):
+        return "[\n" + ",\n".join(f"{indent} {text(each, indent + ' ')}" for each in value) + f"\n{indent}]"
+    return json.dumps(_short(value.tolist() if isinstance(value, np.ndarray) else value), separators=(",", ":"))
+
+
+def _short(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_short(each) for each in value]
+    if isinstance(value, float):
+        return int(value) if value.is_integer() and abs(value) < 2**53 else float(f"{value:.15g}")
+    return value
+
+
+def stale(path: Path, fresh: Mapping[str, Any], rtol: float = 1e-9) -> list[str]:
+    """Fields of a file that are not what would be written, up to the last digits of other machines."""
+    if not path.is_file():
+        return [path.name]
+    shipped, wanted = (numbers(_flat(each)) for each in (json.loads(path.read_text("utf-8")), json.loads(text(fresh))))
+    odd = {*shipped} ^ {*wanted}
+    odd |= {name for name in shipped.keys() & wanted.keys() if not _alike(shipped[name], wanted[name], rtol)}
+    return sorted(name for name in odd if ".tolerance." not in name)
+
+
+def _flat(file: Mapping[str, Any]) -> dict[str, Any]:
+    """The scenes by their names."""
+    return {scene["name"]: {key: scene[key] for key in ("inputs", "expected")} for scene in file["scenes"]}
+
+
+def _alike(a: Array, b: Array, rtol: float) -> bool:
+    return a.shape == b.shape and bool(np.allclose(a, b, rtol=rtol, atol=rtol * (np.abs(b).mean() if b.size else 0)))
+
+
+def main(sketches: Sequence[Sketch], space: Space, shipped: Path, arguments: Sequence[str] | None = None) -> int:
+    """Write the file of a world, or check the one that ships with it; the exit status."""
+    parser = argparse.ArgumentParser(description="Golden vectors of paths: write the file anew, or check it.")
+    parser.add_argument("file", nargs="?", default=shipped, type=Path, metavar="FILE", help="default: %(default)s")
+    parser.add_argument("--check", action="store_true", help="compare with what is in the file, write nothing")
+    options = parser.parse_args(arguments)
+    fresh = vectors(sketches, space)
+    if options.check:
+        odd = stale(options.file, fresh)
+        print(f"stale: {', '.join(odd)}" if odd else "the golden paths are up to date")
+        return 1 if odd else 0
+    options.file.parent.mkdir(parents=True, exist_ok=True)
+    options.file.write_bytes((text(fresh) + "\n").encode())
+    return 0

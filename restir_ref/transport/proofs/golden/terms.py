@@ -1,0 +1,277 @@
+"""What paths, shifts, passes, pairs and mutations are made of, as the files of golden vectors have it.
+
+All arrays are columns: the last axis counts paths, shifts and so on; vectors have their d components in front of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from restir_ref.batch import Array, entry, take
+from restir_ref.gradient import gap, omega
+from restir_ref.integrals import Pixels, Reservoirs, shifted
+from restir_ref.mis import WEIGHTS
+from restir_ref.resampling import Input, weigh
+from restir_ref.transport import materials as mat
+from restir_ref.transport.mutations import FarPath, Place, Standing, TwoRays, far_record, land
+from restir_ref.transport.paths import Path, Tracer, Tree, leaves, trace
+from restir_ref.transport.rays import sample_light
+from restir_ref.transport.record import first_connectable, record
+from restir_ref.transport.restir_pt import PathIntegrals
+from restir_ref.transport.shifts import shift_path
+
+Terms = dict[str, Any]
+
+MIS = "pairwise"
+"""The weights of the pass."""
+
+CONFIDENCES = (1.0, 4.0, 2.0)
+"""Of the three inputs of a pass, the canonical one first."""
+
+TURN = 1 / 16
+"""A mutation adds this to the first number of a direction, around the circle."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What a file is about: u (D, N) and pixel (N,); of shifts, their base path, leaf (k, nee) and where to, (M,).
+
+    passes (3, P)  the shifts whose base paths a pass resamples, the canonical one first
+    mutated (Q,)   the shifts whose base paths are mutated
+    """
+
+    u: Array
+    pixel: Array
+    path: Array
+    k: Array
+    nee: Array
+    to: Array
+    passes: Array = field(default_factory=lambda: np.zeros((3, 0), dtype=int))
+    mutated: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def shifted(self, which: Array, to: Array) -> "Chosen":
+        """The same base paths as those shifts, to other pixels."""
+        return Chosen(self.u, self.pixel, self.path[which], self.k[which], self.nee[which], to)
+
+
+def terms(t: Tracer, chosen: Chosen) -> Terms:
+    """Everything, by kind: paths, shifts, pass, pairs, mutations."""
+    tree = trace(t, chosen.u, chosen.pixel)
+    base = records(t, chosen)
+    return {
+        "paths": paths(t, tree),
+        "shifts": shifts(t, base, chosen),
+        "pass": one_pass(t, base, chosen),
+        "pairs": pairs(t, base, chosen),
+        "mutations": mutations(t, chosen),
+    }
+
+
+def records(t: Tracer, chosen: Chosen) -> Path:
+    """The records of the base paths of all shifts, (M,) columns."""
+    tree = trace(t, chosen.u[:, chosen.path], chosen.pixel[chosen.path])
+    return record(t, tree, chosen.k, chosen.nee, leaf_value(tree, chosen.k, chosen.nee))
+
+
+def leaf_value(tree: Tree, k: Array, nee: Array) -> Array:
+    """F (C, N) of leaf (k, nee) of each column."""
+    F = np.zeros_like(tree.T[0])
+    for at, by_light, value in leaves(tree):
+        F = np.where((k == at) & (nee == by_light), value, F)
+    return F
+
+
+# ---------------------------------------------------------------- paths
+
+
+def paths(t: Tracer, tree: Tree) -> Terms:
+    """Vertices x_1 .., what is sampled at each, points on lights, and the contribution of every leaf."""
+    by_hit, by_light = first_connectable(t, tree)
+    found = list(leaves(tree))
+    return {
+        "vertices": {
+            "x": np.stack([v.x for v in tree.x]),
+            "n": np.stack([v.n for v in tree.x]),
+            "primitive": np.stack([v.prim for v in tree.x]),
+            "cos_o": np.stack([v.o[-1] for v in tree.x]),
+            "r": np.stack(tree.r),
+            "T": np.stack(tree.T),
+        },
+        "scattering": {
+            "lobe": np.stack([at.lobe for at in tree.at]),
+            "P": np.stack([at.P for at in tree.at]),
+            "w": np.stack([at.w for at in tree.at]),
+            "p": np.stack([at.p for at in tree.at]),
+            "p_all": np.stack([at.p_all for at in tree.at]),
+            "weight": np.stack([at.weight for at in tree.at]),
+        },
+        "lights": lights(t, tree),
+        "leaves": {
+            "k": [k for k, _, _ in found],
+            "nee": [int(nee) for _, nee, _ in found],
+            "F": np.stack([F for _, _, F in found]),
+            "c": np.stack([by_light[k] if nee else by_hit[k] for k, nee, _ in found]),
+        },
+    }
+
+
+def lights(t: Tracer, tree: Tree) -> Terms:
+    """The light point y of every vertex that scatters, and the density of its direction, 0 where nothing arrives."""
+    points = [sample_light(t.scene, *t.light_numbers(tree.u, i)).y for i in range(1, t.depth + 1)]
+    arrives = np.stack([leaf.bare.any(axis=0) for leaf, _ in tree.lights])
+    density = np.stack([leaf.p_light for leaf, _ in tree.lights])
+    return {"y": np.stack(points), "arrives": arrives.astype(int), "p": np.where(arrives, density, 0)}
+
+
+# ---------------------------------------------------------------- shifts
+
+
+def shifts(t: Tracer, x: Path, chosen: Chosen) -> Terms:
+    """Base records, and the offset paths in pixel `to`."""
+    y, J = shift_path(t, x, chosen.to)
+    connected = x.c > 0
+    return {
+        "record": {
+            "c": x.c,
+            "z": np.where(connected, x.z, 0),
+            "primitive": np.where(connected, x.prim, 0),
+            "lobe_in": np.where(connected, x.lobe_in, 0),
+            "lobe_out": np.where(connected, x.lobe_out, 0),
+            "out": np.where(connected & ~(x.c > x.k), x.out, 0),
+            "S": np.where(connected, x.S, 0),
+            "p_light": np.where(connected & (x.c == x.k), x.p_light, 0),
+            "A": x.A,
+            "F": x.F,
+        },
+        "defined": (J > 0).astype(int),
+        "J": J,
+        "A": np.where(J > 0, y.A, 0),
+        "F": np.where(J > 0, y.F, 0),
+    }
+
+
+# ---------------------------------------------------------------- a pass
+
+
+def one_pass(t: Tracer, x: Path, chosen: Chosen) -> Terms:
+    """Pairwise resampling of three base paths in the pixel of the first: the fields of a dump, and its terms."""
+    of, M = PathIntegrals(t), chosen.passes.shape[1]
+    rows = list(chosen.passes)
+    pixels = [chosen.pixel[chosen.path[row]] for row in rows]
+    here = Pixels(of, pixels[0])
+    inputs = []
+    for i, (row, pixel, c) in enumerate(zip(rows, pixels, CONFIDENCES, strict=True)):
+        X = take(x, row)
+        W = np.full(M, (i + 1) / 4)
+        inputs.append(Input(Reservoirs(X, W, np.full(M, c)), Pixels(of, pixel) if i else here))
+    landed = [(each.X.x, np.ones(M)) if each.at is here else _landed(each, here) for each in inputs]
+    p_hat, J = np.stack([of.target(here.index, y) for y, _ in landed]), np.stack([J for _, J in landed])
+    p_hat = np.where(J > 0, p_hat, 0)
+    found = list(weigh(inputs, here, WEIGHTS[MIS]))
+    w = np.stack([each.p_hat * each.mW for each in found])
+    W = np.stack([each.X.W for each in inputs])
+    u, s = middle(w)
+    w_sum, chosen_p_hat = w.sum(axis=0), entry(p_hat, s)
+    weight = np.divide(w_sum, chosen_p_hat, out=np.zeros(M), where=chosen_p_hat > 0)
+    return {
+        "mis": MIS,
+        "canonical": [1, 0, 0],
+        "W": W,
+        "c": np.stack([each.X.c for each in inputs]),
+        "p_hat": p_hat,
+        "J": J,
+        "p_hat_own": np.stack([of.target(each.at.index, each.X.x) for each in inputs]),
+        "p_hat_from": np.stack([_from(y, J, here, inputs) for y, J in landed]),
+        "u": u,
+        "w": w,
+        "w_sum": w_sum,
+        "s": s,
+        "W_Y": weight,
+    }
+
+
+def _landed(source: Input, here: Pixels) -> tuple[Path, Array]:
+    y = shifted(source.X.x, source.at, here)
+    return y.x, y.J
+
+
+def _from(y: Path, J: Array, here: Pixels, inputs: list[Input]) -> Array:
+    """p_hat_j(T_j^-1 y) |dT_j^-1/dy| of every input j, 0 where y does not exist; (M, N).  [GRIS Eq. 35]"""
+    rows = []
+    for each in inputs:
+        back = shifted(y, here, each.at)
+        rows.append(np.where((J > 0) & (back.J > 0), each.at.of.target(each.at.index, back.x) * back.J, 0))
+    return np.stack(rows)
+
+
+def middle(w: Array) -> tuple[Array, Array]:
+    """A number in the middle of the widest option's interval, a multiple of 2^-12, and the option; (N,) each."""
+    whole = w.sum(axis=0)
+    share = np.divide(w, whole, out=np.zeros_like(w), where=whole > 0)
+    s = share.argmax(axis=0)
+    before = entry(np.cumsum(share, axis=0) - share, s)
+    return np.floor((before + entry(share, s) / 2) * 2**12) / 2**12, s
+
+
+# ---------------------------------------------------------------- pairs and mutations
+
+
+def pairs(t: Tracer, x: Path, chosen: Chosen) -> Terms:
+    """Of the pair (pixel, to) with every shift's base path: w_ij and f_i - f_j J.  [GPT Eq. 2, 13]"""
+    of = PathIntegrals(t)
+    base, offset = Pixels(of, chosen.pixel[chosen.path]), Pixels(of, chosen.to)
+    y = shifted(x, base, offset)
+    return {"omega": omega(x, base, y, offset), "gap": gap(x, base, y, offset)}
+
+
+def mutations(t: Tracer, chosen: Chosen) -> Terms:
+    """The base paths of the shifts `mutated`: another direction w from x_(c-1), joined to x_(c+1) by the same lobes.
+
+    T (., P) is the ratio of transitions, 0 if the proposal is rejected; F and z = x_c are 0 there.  [MCMC 4.1]
+    """
+    some = chosen.shifted(chosen.mutated, chosen.to[chosen.mutated])
+    x, still = moving(t, some)
+    w = turned(t, x, still.at)
+    moved, T = land(t, x, still.at, w, x.lobe_in)
+    return {"w": w, "T": T, "F": np.where(T > 0, moved["F"], 0), "z": np.where(T > 0, moved["z"], 0)}
+
+
+def moving(t: Tracer, chosen: Chosen) -> tuple[FarPath, Standing]:
+    """Those of the shifts' base paths that reconnect somewhere, and where they stand before."""
+    tree = trace(t, chosen.u[:, chosen.path], chosen.pixel[chosen.path])
+    x = far_record(t, tree, (chosen.k, chosen.nee), leaf_value(tree, chosen.k, chosen.nee))
+    one = np.ones(len(x.k))
+    still = TwoRays(t).standing(Reservoirs(x, one, one), chosen.pixel[chosen.path])
+    return take(x, still.columns), still
+
+
+def turned(t: Tracer, x: FarPath, at: Place) -> Array:
+    """The direction from x_(c-1) that its lobe samples with a number TURN further, (d, N)."""
+    number = np.stack([_number_into(t, x, row) for row in range(t.scene.space.d - 1)])
+    number[0] = (number[0] + TURN) % 1
+    local = mat.sample_lobe(t.scene.materials, t.scene.space, at.v, x.lobe_in, number)
+    return t.scene.space.to_world(at.v.n, local)
+
+
+def _number_into(t: Tracer, x: Path, row: int) -> Array:
+    """One of the numbers of the direction from x_(c-1) to x_c, (N,)."""
+    every = np.stack([t.direction_numbers(x.u, i)[row] for i in range(1, t.depth + 1)])
+    return np.array(entry(every, x.c - 2))
+
+
+def numbers(found: Mapping[str, Any], where: str = "") -> dict[str, Array]:
+    """All arrays of nested terms by their dotted names."""
+    flat: dict[str, Array] = {}
+    for name, value in found.items():
+        if isinstance(value, Mapping):
+            flat |= numbers(value, f"{where}{name}.")
+        elif not isinstance(value, str):
+            flat[f"{where}{name}"] = np.asarray(value)
+    return flat
+
+
+def first_points(t: Tracer, pixel: Array) -> Array:
+    """x_0 of every column, (d, N)."""
+    return np.asarray(t.sensor.ray(pixel, np.zeros((0, len(pixel))))[0])
