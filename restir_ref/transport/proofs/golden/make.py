@@ -98,7 +98,7 @@ def choose(t: Tracer, chance: Chance) -> Chosen:
     clear = np.flatnonzero(margin_of_shifts(t, every) > MARGIN)
     spread = clear[np.argsort(clear * 0.618034 % 1, kind="stable")]  # over paths, leaves and pixels
     some = mixed(spread, every.nee[spread] == 0, SHIFTS)
-    shifts = Chosen(u, pixel, *(part[some] for part in (every.path, every.k, every.nee, every.to)))
+    shifts = every.shifted(some, every.to[some])
     return replace(shifts, passes=clear_passes(t, shifts), mutated=clear_mutations(t, shifts))
 
 
@@ -113,7 +113,8 @@ def every_shift(t: Tracer, u: Array, pixel: Array) -> Chosen:
     lit = [(path, k, int(nee)) for k, nee, F in leaves(trace(t, u, pixel)) for path in np.flatnonzero(F.any(axis=0))]
     path, k, nee = (np.array(column) for column in zip(*lit, strict=True))
     turns = [(pixel[path] + 1 + turn) % t.sensor.n for turn in range(t.sensor.n - 1)]
-    return Chosen(u, pixel, *(np.tile(part, len(turns)) for part in (path, k, nee)), np.concatenate(turns))
+    path, k, nee = (np.tile(part, len(turns)) for part in (path, k, nee))
+    return Chosen(u, pixel, path, k, nee, np.concatenate(turns))
 
 
 def clear_passes(t: Tracer, s: Chosen) -> Array:
@@ -178,7 +179,8 @@ def tolerances(sketch: Sketch, space: Space, chosen: Chosen, expected: Mapping[s
     """
     step = 2.0**-30
     rng = np.random.default_rng(SEED + 1)
-    want, worst = numbers(expected), {}
+    want: dict[str, Array] = numbers(expected)
+    worst: dict[str, float] = {}
     for _ in range(8):
         moved, there = moved_by(sketch, step, rng), chosen.u * (1 + step * rng.uniform(-1, 1, chosen.u.shape))
         got = numbers(terms(moved.tracer(space), replace(chosen, u=np.minimum(there, 1 - step))))
