@@ -273,7 +273,7 @@ FIGURE = Figure(
     source="[GRIS Fig. 9; 6.4, 6.5, 9.1]",
     claims=("GRIS-F09a", "GRIS-F09b", "GRIS-F09t"),
     presets={
-        "quick": {"image": [1000, 64], "mean": [2000, 24], "ring": [300], "ring mean": [3000], "alone": [24]},
+        "quick": {"image": [1000, 36], "mean": [2000, 14], "ring": [300], "ring mean": [3000], "alone": [24]},
         "paper": {"image": [2000, 64], "mean": [10_000, 64], "ring": [1000], "ring mean": [10_000], "alone": [128]},
     },
     arm="cap",

@@ -151,7 +151,7 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"replicas": 8, PT: 96},
+        "quick": {"replicas": 8, PT: 72},
         "paper": {"replicas": 24, PT: 288},
     },
     chunks=chunks,

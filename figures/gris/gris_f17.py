@@ -316,7 +316,7 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"path tracing": 1024, "path reuse": 512, "reconnection": 96, "hybrid": 96, "shifts": 64},
+        "quick": {"path tracing": 768, "path reuse": 384, "reconnection": 64, "hybrid": 64, "shifts": 48},
         "paper": {"path tracing": 8192, "path reuse": 8192, "reconnection": 1024, "hybrid": 1024, "shifts": 512},
     },
     chunks=chunks,
