@@ -319,10 +319,10 @@ FIGURE = Figure(
         },
         "paper": {
             "n": [1, 2, 4, 8, 16, 32, 64, 128],
-            "columns": 384,
-            "inputs": 32_768,
+            "columns": 192,
+            "inputs": 16_384,
             "M": [1, 3, 5, 9, 17, 33, 65, 129],
-            "replicas": {"talbot": 3000, "defensive": 30_000},
+            "replicas": {"talbot": 1500, "defensive": 15_000},
         },
     },
     chunks=chunks,
