@@ -6,7 +6,7 @@ from pathlib import Path
 from figures.engine.manifest import ROOT
 from figures.engine.registry import standing
 
-WINGS = ("figures.gris", "figures.gradient", "figures.mcmc", "figures.trust")
+WINGS = ("figures.gris", "figures.gradient", "figures.mcmc", "figures.ddgi", "figures.trust")
 """The papers in their order, then what no paper has."""
 
 
