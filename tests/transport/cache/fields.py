@@ -39,6 +39,14 @@ class Smooth(Uniform):
         return ball_volume(self.d) * at * np.linspace(1, 0.5, self.C)[:, None]
 
 
+@dataclass(frozen=True)
+class Beam(Uniform):
+    """Bright from one side, and dim from all others: where a surface looks decides what it sends."""
+
+    def irradiance(self, x: Array, n: Array, w: Array, b: Array) -> Array:
+        return ball_volume(self.d) * (0.05 + np.maximum(w[:1], 0) ** 4) * np.ones((self.C, 1))
+
+
 def asking(space: Space, layers: Sequence[Layer], field: Uniform, cos: float, n: int) -> tuple[Cache, Vertex]:
     """A cache in a room of one material, and n equal vertices on one of its walls, seen under a cosine."""
     s = scene(space, [Material(layers)], walls(space.d, 0, (1.0,) * field.C))

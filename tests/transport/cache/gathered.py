@@ -1,5 +1,6 @@
 """What x_1 takes from all surfaces, by quadrature over directions; and frames of resampling the same."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,16 +66,27 @@ def drawn(here: Pixels, chance: Chance) -> Drawn:
     return Drawn(resample([*lights, (found.x, found.mW)], here, chance), found)
 
 
-def reused(here: Pixels, chance: Chance, frames: int, mis: Weights = WEIGHTS["talbot"], radius: int = 10) -> Drawn:
-    """The last of some frames with temporal reuse and three neighbours."""
+After = Callable[[Pixels, Reservoirs, Chance], Reservoirs]
+"""What a mistake does to reservoirs after every pass."""
+
+
+def unchanged(here: Pixels, X: Reservoirs, chance: Chance) -> Reservoirs:
+    return X
+
+
+def reused(
+    here: Pixels, chance: Chance, frames: int, mis: Weights = WEIGHTS["talbot"], after: After = unchanged
+) -> Drawn:
+    """The last of some frames with temporal reuse and three neighbours within 10 pixels."""
     image: Image = here.of
     now = drawn(here, chance)
-    X = now.X
+    X = after(here, now.X, chance)
     for k in range(frames):
         if k:
             now = drawn(here, chance)
-            X = temporal(now.X, here, X, [here], chance, mis=mis)
-        X = spatial(X, here, random_in_row(image, here.index, 3, radius, chance), chance, mis=mis)
+            X = after(here, temporal(now.X, here, X, [here], chance, mis=mis), chance)
+        X = spatial(X, here, random_in_row(image, here.index, 3, 10, chance), chance, mis=mis)
+        X = after(here, X, chance)
     return Drawn(X, now.found)
 
 

@@ -14,7 +14,7 @@ from restir_ref.batch import Array, ratio
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Reservoirs, Shifted
 from restir_ref.mis import WEIGHTS
-from restir_ref.oracle.laws import bias_of
+from restir_ref.oracle.laws import bias_of, expected_sum
 from restir_ref.restir import initial, spatial, temporal
 
 PIXELS, CELLS = 2, 4
@@ -76,8 +76,32 @@ def untouched(of: Cells, here: Pixels, X: Reservoirs) -> Reservoirs:
 
 def looked_up_again(of: Cells, here: Pixels, X: Reservoirs) -> Reservoirs:
     """A mistake: W is divided by what this pixel looks up, not by what the sample was selected with."""
-    own = Valued(X.x.cell, of.values[:, here.index % of.n, X.x.cell])
-    return replace(X, W=X.W * ratio(of.target(here.index, X.x), of.target(here.index, own)))
+    anew = Valued(X.x.cell, of.values[:, here.index % of.n, X.x.cell])
+    return replace(X, W=X.W * ratio(of.target(here.index, X.x), of.target(here.index, anew)))
+
+
+Shown = Callable[[Cells, Array, Valued], Array]
+"""The value (2, N) that a pixel shades with."""
+
+
+def own(of: Cells, index: Array, x: Valued) -> Array:
+    return of.values[:, index % of.n, x.cell]
+
+
+def as_kept(of: Cells, index: Array, x: Valued) -> Array:
+    """A mistake: what was looked up for another pixel."""
+    return x.value
+
+
+def shaded(of: Cells, value: Shown) -> Array:
+    """Exact mean image over its truth, (2, n), after reuse between the pixels."""
+
+    def program(index: Array, chance: Chance) -> Array:
+        here, near = Pixels(of, index), [Pixels(of, index - index % PIXELS + (index + 1) % PIXELS)]
+        X = spatial(initial(here, chance), here, near, chance)
+        return np.asarray(of.f[:, index % of.n, X.x.cell] * value(of, index, X.x) * X.W)
+
+    return expected_sum(program, PIXELS) / (of.f * of.values).sum(axis=-1)
 
 
 def largest_bias(of: Cells, mis: str, after=untouched) -> float:
@@ -115,3 +139,13 @@ def test_a_value_of_0_where_another_pixel_sees_light_is_biased() -> None:
     values = right.values.copy()
     values[:, 0, 2] = 0
     assert largest_bias(replace(right, values=values), "talbot") > 0.05
+
+
+@pytest.mark.claims("DDGIR-C03", part="finite cells")
+def test_shading_with_what_the_pixel_itself_looks_up_is_unbiased() -> None:
+    np.testing.assert_allclose(shaded(cells(), own), 1, rtol=1e-12)
+
+
+@pytest.mark.claims("DDGIR-C03", part="control on finite cells")
+def test_shading_with_the_kept_value_is_biased() -> None:
+    assert np.abs(shaded(cells(), as_kept) - 1).max() > 0.05
