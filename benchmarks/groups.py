@@ -289,7 +289,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         "audit": Group(("restir_ref/audit/*.py",), ("tests/audit/test_*.py",), equivalent=AUDIT),
         "transport": Group(
             ("restir_ref/transport/**/*.py",),
-            ("tests/transport/test_*.py", "tests/flatland/test_*.py"),
+            ("tests/transport/**/test_*.py", "tests/flatland/test_*.py"),
             equivalent=TRANSPORT,
         ),
         "toy1d": Group(("toy1d/*.py",), ("tests/core/test_*.py", "tests/toy1d/test_*.py"), equivalent=TOY1D),

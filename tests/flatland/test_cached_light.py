@@ -39,39 +39,9 @@ from restir_ref.transport.counting import CLOSEST, SHADOW
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, Tracer
 from restir_ref.transport.scene import scene as compiled
+from tests.flatland.cached import PIXELS, agrees, lighted, replicated, row, truth
 from tests.transport.cache.fields import Beam, Smooth
 from tests.transport.cache.gathered import Drawn, at_centres, drawn, gathered, reused, shown, unchanged
-
-PIXELS, REPLICAS = 32, 256
-CROPS = {"matte_cornell": 240, "crease": 128, "ajar": 224, "glossy_cornell": 240, "occluders": 96}
-"""First pixels, on a film of 480, of rows that show what the scenes are for."""
-
-
-def row(scene: str) -> Tracer:
-    setting = SCENES[scene]()
-    return Tracer(setting.scene, replace(setting.pinhole(PIXELS, 0), film=480, first=CROPS[scene]), 1, RECONNECTION)
-
-
-def lighted(scene: str, replicas: int = REPLICAS, G_max: float = np.inf, **other) -> Pixels:
-    """Replicas of the row; `other` fields of the integrals."""
-    t = row(scene)
-    here = at_centres(t, Cache(t.scene, Smooth(2)), replicas, G_max)
-    return Pixels(replace(here.of, **other), here.index)
-
-
-@cache
-def truth(scene: str) -> Array:
-    """By quadrature; halving the cells changes the mean by less than a tenth of eps = 2 %."""
-    of = lighted(scene, 1).of
-    fine, coarse = (gathered(of, cells)[0] for cells in (4096, 2048))
-    assert abs(fine.mean() - coarse.mean()) < 0.002 * fine.mean()
-    return fine
-
-
-def replicated(image: Array) -> Array:
-    """(C, N) -> the first channel, (replicas, pixels)."""
-    return image[0].reshape(-1, PIXELS)
-
 
 Frame = Callable[[Pixels, Live], Drawn]
 
@@ -79,10 +49,6 @@ Frame = Callable[[Pixels, Live], Drawn]
 def image(here: Pixels, frame: Frame, seed: int = 1) -> Array:
     chance = Live(np.random.default_rng(seed))
     return replicated(shown(here, frame(here, chance), chance))
-
-
-def agrees(scene: str, found: Array, eps: float = 0.02) -> bool:
-    return all_unbiased(mean_and_blocks(found, 4), mean_and_blocks(truth(scene), 4), eps).passed
 
 
 # ---------------------------------------------------------------- one frame
@@ -312,7 +278,7 @@ def test_a_frame_that_looks_at_once_asks_for_every_candidate_that_would_send_lig
 def test_the_residual_reuses_the_ray_among_the_candidates() -> None:
     here, chance = lighted("crease", 16, 1.0), Live(np.random.default_rng(1))
     frame = drawn(here, chance)
-    np.testing.assert_array_equal(frame.found.x.y, frame.found.z.x)
+    np.testing.assert_array_equal(frame.found.x.y, frame.found.ray.z.x)
     at = connection(here.of, here.index, frame.found.x)
     over = frame.found.rest.any(axis=0)
     np.testing.assert_array_equal(over, (at.G > 1) & (frame.found.mW > 0))

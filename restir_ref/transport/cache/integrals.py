@@ -82,19 +82,30 @@ class Connection:
 
 
 @dataclass(frozen=True)
-class Found:
-    """The ray by the BSDF: the candidate x with its m W (N,), and what the residual reuses.  [DDGIR 3.5]
+class Ray:
+    """A ray from x_1 by the BSDF, and the vertex z that it met.
 
-    z, r, p  the vertex it met, at what distance (N,), and the density (N,) of its direction, 0 of delta lobes
-    rest (C, N)  T f_r |cos_1| / p max(1 - G_max / G, 0), and without the last factor for delta lobes, which cannot
-                 be shared; 0 where nothing was met
+    w (d, N), r (N,)  its direction, and how far z is;  p (N,) density of w by all lobes, 0 of delta lobes
+    weight (C, N)     T f_r |cos_1| / p;  0 where nothing was met
     """
 
-    x: Second
-    mW: Array
     z: Vertex
+    w: Array
     r: Array
     p: Array
+    weight: Array
+
+
+@dataclass(frozen=True)
+class Found:
+    """The candidate x of a ray with its m W (N,), and what the residual takes of the same ray.  [DDGIR 3.5]
+
+    rest (C, N)  the ray's weight times max(1 - G_max / G, 0), and all of it by delta lobes, which cannot be shared
+    """
+
+    ray: Ray
+    x: Second
+    mW: Array
     rest: Array
 
 
@@ -257,23 +268,31 @@ def on_lights(of: CacheIntegrals, index: Array, chance: Chance) -> Iterator[tupl
         yield _first_held(of, index, x, at), 1 / (of.lights * light.pdf_area + at.p)
 
 
-def by_ray(of: CacheIntegrals, index: Array, chance: Chance) -> Found:
-    """The point that a ray by the BSDF meets; its density per area is that of all lobes, p_w |cos_y| / r^(d-1)."""
-    s, d = of.scene, of.scene.space.d
+def ray(of: CacheIntegrals, index: Array, chance: Chance) -> Ray:
+    """One ray by the BSDF, a lobe first; what it carries is weighed by the density of all lobes."""
+    s = of.scene
     v, T = take((of.v, of.T), index)
-    u, P = chance.uniform((d, len(index))), mat.lobe_shares(s.materials, v)
+    u, P = chance.uniform(v.x.shape), mat.lobe_shares(s.materials, v)
     lobe = mat.choose_lobe(P, u[0])
     g = gloss_of(s, v, P, lobe, mat.sample_lobe(s.materials, s.space, v, lobe, u[1:]))
+    f, p = mat.evaluate_all(s.materials, s.space, v, P, g.i)
     z, r, met = arrive(s, v.x, g.w)
-    met = met & ~g.lost
+    weight = np.where(g.p > 0, ratio(f, p), g.weight)
+    return Ray(z, g.w, r, g.p, T * weight * (met & ~g.lost))
+
+
+def by_ray(of: CacheIntegrals, index: Array, chance: Chance) -> Found:
+    """The point that a ray meets; its density per area is that of all lobes, p |cos_y| / r^(d-1)."""
+    found = ray(of, index, chance)
+    z, met = found.z, np.asarray(found.weight.any(axis=0))
     x = replace(_point(of, z.x, z.n, z.prim, chance), seen=met)
     at = connection(of, index, x)
     at = replace(at, f=at.f * met)
-    by_density = met & (g.p > 0) & (at.p > 0)  # not by a delta lobe
-    p_light = light_pdf(s, z, r) * z.o[-1] / power(r, d - 1)
-    mW = by_density / np.where(by_density, of.lights * p_light + at.p, 1)
-    rest = np.where(g.p > 0, ratio(at.f, at.p) * (1 - bound(of.G_max, at.G)), T * g.weight * met)
-    return Found(_first_held(of, index, x, at), mW, z, r, np.where(g.p > 0, at.p_w, 0.0), rest)
+    shared = met & (found.p > 0) & (at.p > 0)
+    p_light = light_pdf(of.scene, z, found.r) * z.o[-1] / power(found.r, of.scene.space.d - 1)
+    mW = shared / np.where(shared, of.lights * p_light + at.p, 1)
+    rest = found.weight * np.where(found.p > 0, 1 - bound(of.G_max, at.G), 1)
+    return Found(found, _first_held(of, index, x, at), mW, rest)
 
 
 def light_primitive(s: Scene, pick: Array) -> Array:

@@ -16,7 +16,7 @@ from restir_ref.guards import positive, whole
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.transport import materials as mat
 from restir_ref.transport.cache.footprint import pixel_footprint, widening
-from restir_ref.transport.cache.integrals import CacheIntegrals, Found, connection
+from restir_ref.transport.cache.integrals import CacheIntegrals, Found, Ray, connection
 from restir_ref.transport.cache.leaving import (
     Cache,
     diffuse,
@@ -86,8 +86,8 @@ def recursive(threshold: float, most: int = MOST) -> Shading:
             L[:, columns] += T * step.L
             on = np.flatnonzero(step.goes_on)
             columns, T, length, a0 = take((columns, T * step.weight, length, a0), on)
-            v, r, met = arrive(c.scene, v.x.take(on, axis=-1), step.w.take(on, axis=-1))
-            p, T = step.p.take(on), T * met
+            v, r, hit = arrive(c.scene, v.x.take(on, axis=-1), step.w.take(on, axis=-1))
+            p, T = step.p.take(on), T * hit
             L[:, columns] += T * emitted(c.scene, v)
         return L
 
@@ -149,14 +149,18 @@ def residual(of: CacheIntegrals, index: Array, found: Found, shading: Shading, c
 
     [DDGIR Eq. 9]
     """
-    wanted = np.asarray(found.rest.any(axis=0))
-    return found.rest * sent(of.cache, arrival(of, index, found.z, found.r, found.p, wanted), shading, chance)
+    return found.rest * sent(of.cache, met(of, index, found.ray, found.rest), shading, chance)
 
 
 def arrival(of: CacheIntegrals, index: Array, z: Vertex, r: Array, p: Array, wanted: Array) -> Arrival:
     """Vertices z as x_1 of columns `index` (N,) meets them."""
     a0 = pixel_footprint(of.r.take(index), of.v.o[-1].take(index), of.scene.space.d)
     return Arrival(z, r, p, a0, wanted)
+
+
+def met(of: CacheIntegrals, index: Array, ray: Ray, weight: Array) -> Arrival:
+    """What rays from x_1 of columns `index` (N,) meet, wanted where they carry anything."""
+    return arrival(of, index, ray.z, ray.r, ray.p, np.asarray(weight.any(axis=0)))
 
 
 def sent(c: Cache, at: Arrival, shading: Shading, chance: Chance) -> Array:
