@@ -20,6 +20,8 @@ from restir_ref.transport.rays import arrive, emitted
 from tests.transport.lobe_cases import grid
 
 CENTRE = 0.5
+TURNS = np.array([[GOLDEN], [np.sqrt(2)]])
+"""Grids of neighbouring pixels, and of neighbouring directions, are turned by these, so that their errors cancel."""
 
 
 def at_centres(t: Tracer, cache: Cache, replicas: int, G_max: float = np.inf) -> Pixels:
@@ -35,15 +37,13 @@ def gathered(of: CacheIntegrals, cells: int, glossy: int = 4) -> Array:
     points = grid(d - 1, cells)
     K = points.shape[-1]
     v, T = take((of.v, of.T), np.repeat(np.arange(n), K))
-    x = s.space.ball(np.tile(points, n))
+    x = s.space.ball((np.tile(points, n) + np.repeat(TURNS[: d - 1] * np.arange(n), K, axis=1)) % 1)
     cos = np.sqrt(1 - (x * x).sum(axis=0))
     i = np.concatenate([x, cos[None]])
     f, _ = mat.evaluate_all(s.materials, s.space, v, mat.lobe_shares(s.materials, v), i)
     z, r, met = arrive(s, v.x, s.space.to_world(v.n, i))
     L, numbers = emitted(s, z), grid(d - 1, glossy)
-    turned = (
-        np.arange(len(r)) * np.array([[GOLDEN], [GOLDEN**2 + np.sqrt(2)]])[: d - 1]
-    )  # another rule in every direction
+    turned = TURNS[: d - 1] * np.arange(len(r))
     for k in range(numbers.shape[-1]):
         u = np.concatenate([np.full((1, len(r)), 0.5), (numbers[:, k : k + 1] + turned) % 1])
         L = L + leaving(of.cache, z, r, u) / numbers.shape[-1]
