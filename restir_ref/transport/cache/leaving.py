@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from restir_ref.batch import Array, pick, ratio, take
+from restir_ref.chance import Chance
 from restir_ref.transport import materials as mat
 from restir_ref.transport.cache.field import Field
 from restir_ref.transport.lobes import KINDS
@@ -128,6 +129,15 @@ def leaving(c: Cache, v: Vertex, r: Array, u: Array, sampled: Sampled = gloss) -
         g = sampled(c, part, u.take(glossy, axis=-1))
         L[:, glossy] += g.weight * mirrored(c, part, r.take(glossy), g)
     return L
+
+
+def telling(displaced: Displacement) -> Callable[[Scene, Field, Vertex, Array, Chance], Array]:
+    """Both terms of Eq. 6 for updates of probes: (scene, field, vertices, r (N,), chance) -> L+ (C, N).  [DDGIR 3.3]"""
+
+    def told(scene: Scene, field: Field, v: Vertex, r: Array, chance: Chance) -> Array:
+        return leaving(Cache(scene, field, displaced), v, r, chance.uniform(v.x.shape))
+
+    return told
 
 
 def diffuse(c: Cache, v: Vertex, r: Array) -> Array:
