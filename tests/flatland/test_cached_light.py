@@ -59,7 +59,7 @@ def image(here: Pixels, frame: Frame, seed: int = 1) -> Array:
 @pytest.mark.parametrize("G_max", [np.inf, 4.0])
 @pytest.mark.parametrize("scene", ["crease", "ajar", "glossy_cornell"])
 def test_candidates_alone_are_secondary_queries_in_expectation(scene, G_max) -> None:
-    assert agrees(scene, image(lighted(scene, 1024, G_max), drawn))
+    assert agrees(scene, image(lighted(scene, 640, G_max), drawn))
 
 
 @pytest.mark.claims("DDGIR-A02", part="control")
@@ -77,7 +77,7 @@ def test_a_density_that_is_not_converted_to_area_is_noticed(monkeypatch) -> None
 @pytest.mark.parametrize("scene", ["crease", "glossy_cornell", "occluders"])
 @pytest.mark.parametrize("mis", ["talbot", "defensive"])
 def test_reuse_that_sees_obstacles_is_secondary_queries_in_expectation(scene, mis) -> None:
-    here = lighted(scene, 1024, 4.0)
+    here = lighted(scene, 640, 4.0)
     assert agrees(scene, image(here, lambda here, chance: reused(here, chance, 3, WEIGHTS[mis])))
 
 
@@ -139,7 +139,7 @@ def test_on_lambert_surfaces_kept_values_are_the_values_asked_again(scene) -> No
 @pytest.mark.claims("DDGIR-C03", part="to 2 %")
 @pytest.mark.parametrize("value", [kept, asked])
 def test_on_glossy_surfaces_neither_is_biased(value) -> None:
-    here = lighted("glossy_cornell", 1024, 4.0, value=value)
+    here = lighted("glossy_cornell", 640, 4.0, value=value)
     assert agrees("glossy_cornell", image(here, lambda *given: reused(*given, 3)))
     assert not np.array_equal(images_of(kept, "glossy_cornell"), images_of(asked, "glossy_cornell"))
 
@@ -187,7 +187,7 @@ def shiny_image(replicas: int, after=unchanged) -> Array:
 
 def test_where_values_depend_on_who_asks_kept_ones_are_unbiased() -> None:
     blocks = mean_and_blocks(shiny_truth(), 4)
-    assert all_unbiased(mean_and_blocks(shiny_image(1024), 4), blocks, eps=0.02).passed
+    assert all_unbiased(mean_and_blocks(shiny_image(768), 4), blocks, eps=0.02).passed
 
 
 @pytest.mark.claims("DDGIR-A08", part="control")

@@ -40,7 +40,7 @@ def by_restir_di(here: Pixels, chance: Live) -> Array:
 @pytest.mark.claims("COM-B10", part="to 2 %")
 @pytest.mark.parametrize("scene", ["crease", "glossy_cornell"])
 def test_secondary_queries_and_restir_di_are_what_a_cache_sends_to_x_1(scene) -> None:
-    here, chance = lighted(scene, 2048), Live(np.random.default_rng(1))
+    here, chance = lighted(scene, 1024), Live(np.random.default_rng(1))
     found = replicated(by_restir_di(here, chance) + secondary(here.of, here.index, plain, chance))
     assert all_unbiased(mean_and_blocks(found, 4), mean_and_blocks(truth(scene), 4), eps=0.02).passed
 
@@ -49,7 +49,7 @@ def test_secondary_queries_and_restir_di_are_what_a_cache_sends_to_x_1(scene) ->
 @pytest.mark.parametrize("scene", ["crease", "glossy_cornell", "occluders"])
 def test_frames_of_ddgi_resampling_are_secondary_queries_in_expectation(scene) -> None:
     """Three frames of the real-time preset; nothing of the row emits."""
-    here, chance, now = lighted(scene, 1024, 4.0), Live(np.random.default_rng(2)), None
+    here, chance, now = lighted(scene, 640, 4.0), Live(np.random.default_rng(2)), None
     preset = replace(REAL_TIME, radius=10)
     for _ in range(3):
         now = frame(here, chance, preset, random_in_row, now.X if now else None, [here])

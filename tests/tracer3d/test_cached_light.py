@@ -16,7 +16,7 @@ from tests.transport.cache.fields import Smooth
 from tests.transport.cache.gathered import Drawn, at_centres, drawn, gathered, shown
 from tracer3d import SCENES
 
-SIDE, REPLICAS = 4, 1024
+SIDE, REPLICAS = 4, 512
 
 
 def crop(scene: str, replicas: int, G_max: float = np.inf) -> Pixels:
@@ -30,7 +30,7 @@ def crop(scene: str, replicas: int, G_max: float = np.inf) -> Pixels:
 def truth(scene: str) -> Array:
     """By quadrature, (C, n); half as many cells along an angle change the mean by less than a quarter of eps."""
     of = crop(scene, 1).of
-    fine, coarse = (gathered(of, cells) for cells in (100, 50))
+    fine, coarse = (gathered(of, cells) for cells in (72, 36))
     assert abs(fine.mean() - coarse.mean()) < 0.005 * fine.mean()
     return fine
 
