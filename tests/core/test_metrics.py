@@ -36,7 +36,7 @@ HAND = {
 }
 
 
-@pytest.mark.claims("COM-M01", "COM-M02", "COM-M03", "GRIS-C14")
+@pytest.mark.claims("COM-M01", "COM-M02", "COM-M03", "GRIS-C14", "DDGIR-E10")
 @pytest.mark.parametrize("metric", HAND, ids=lambda metric: metric.__name__)
 def test_a_hand_case_has_its_value_and_leading_axes_stay(metric):
     assert metric(IMAGE, R) == pytest.approx(HAND[metric], rel=1e-12)

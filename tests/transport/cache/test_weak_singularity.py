@@ -78,6 +78,7 @@ def test_in_space_the_second_moment_grows_like_1_over_the_squared_distance_to_th
     assert unbounded_slope("space").passed
 
 
+@pytest.mark.claims("DDGIR-E09", part="second moments, by quadrature")
 @pytest.mark.claims("DDGIR-P01", part="bounded")
 @pytest.mark.claims("DDGIR-P01", part="bounded", world="tracer3d")
 @pytest.mark.parametrize("G_max", [1.0, 4.0, 16.0])
