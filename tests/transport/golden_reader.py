@@ -1,8 +1,8 @@
 """A second reader of the golden paths, written from `docs/golden.md` alone, as one would write it for a GPU.
 
 Scalar Python without NumPy, which shares no code with what wrote the files. `real` is the type of number that every
-result is rounded to: `float`, or `numpy.float32`, which stays in single precision beside Python's own numbers. Vectors are
-tuples; directions called o or i are local, w is one in the world. Comments name the page's sections.
+result is rounded to: `float`, or `numpy.float32`, which stays in single precision beside Python's own numbers. Vectors
+are tuples; directions called o or i are local, w is one in the world. Comments name the page's sections.
 """
 
 import math
@@ -78,7 +78,7 @@ class Light(NamedTuple):
 
 @dataclass(frozen=True)
 class Vertex:
-    """x on a primitive, n, o and r as seen from the vertex before, the emission to there, T, and the numbers used here."""
+    """A point x of a primitive; n, o, r and emission as seen from the vertex before; T; the numbers used here."""
 
     primitive: int
     x: Vector
@@ -98,7 +98,7 @@ class Leaf(NamedTuple):
 
     @property
     def end(self) -> int:
-        """The number of the last vertex, a light point that was sampled not counted."""
+        """The number of the last vertex, the light point of light sampling not counted."""
         return self.k + 1 - self.nee
 
 
@@ -122,6 +122,7 @@ class Reader:
         things = scene["facets"] + scene["balls"]
         self.layers = [materials[x["material"]] for x in things]
         self.emission = [self.vector(x.get("emission") or self.black) for x in things]
+        self.walked: dict[tuple[int, Vector], Path] = {}
         self.share = self.shares([self.mean(e) * x.size for e, x in zip(self.emission, self.facets, strict=False)])
 
     def vector(self, a: Any) -> Vector:
@@ -278,6 +279,8 @@ class Reader:
         if not (slope := dot(facet.n, w)):
             return self.real(0)
         t = dot(facet.n, along(facet.corner, -1, x)) / slope
+        if t <= 0:
+            return t
         at = along(along(x, t, w), -1, facet.corner)
         if self.d == 2:
             b = [dot(at, facet.edges[0]) / facet.size**2]
@@ -332,6 +335,11 @@ class Reader:
 
     def walk(self, pixel: int, numbers: Vector) -> Path:
         """The path of these numbers; it has less than depth + 1 vertices if it goes dark."""
+        if (pixel, numbers) not in self.walked:
+            self.walked[pixel, numbers] = self.trace(pixel, numbers)
+        return self.walked[pixel, numbers]
+
+    def trace(self, pixel: int, numbers: Vector) -> Path:
         start, at = self.eyes[pixel]
         u = [numbers[i : i + 2 * self.d] for i in range(0, len(numbers), 2 * self.d)]
         path, x = [], self.cast(start, self.unit(along(at, -1, start)), (), self.one, u[0])

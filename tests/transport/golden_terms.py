@@ -1,5 +1,6 @@
 """What `golden_reader` makes of a scene, as the arrays of a file of golden paths."""
 
+from collections.abc import Iterator
 from typing import Any
 
 from tests.transport.golden_reader import Leaf, Leaving, Path, Reader, along, times
@@ -7,33 +8,30 @@ from tests.transport.golden_reader import Leaf, Leaving, Path, Reader, along, ti
 Terms = dict[str, Any]
 
 
-def terms(reader: Reader, golden: Any) -> Terms:
-    """All terms of one scene, `shifts.J` for instance, columns last."""
+def terms(reader: Reader, golden: Any) -> Iterator[tuple[str, Any]]:
+    """All terms of one scene by their names, `shifts.J` for instance, columns last, in the order of the file."""
     given, leaves, dump = golden["inputs"], golden["expected"]["paths"]["leaves"], golden["expected"]["pass"]
     numbers = zip(given["pixel"], transposed(given["u"]), strict=True)
     paths = [reader.walk(pixel, reader.vector(u)) for pixel, u in numbers]
     ends = [Leaf(*end) for end in zip(leaves["k"], leaves["nee"], strict=True)]
+    for name, row in {"vertices": vertices, "scattering": scattering, "lights": lights}.items():
+        yield from columns(f"paths.{name}", [row(reader, path) for path in paths])
+    yield from columns("paths.leaves", [contributions(reader, path, ends) for path in paths])
     base = [(paths[i], Leaf(k, nee)) for i, k, nee in zip(given["path"], given["k"], given["nee"], strict=True)]
-    shifts = list(zip(base, given["to"], strict=True))
+    yield from columns("shifts.record", [record(reader, *x) for x in base])
+    shifts = [(*x, to) for x, to in zip(base, given["to"], strict=True)]
+    yield from columns("shifts", [shifted(reader, *x) for x in shifts])
+    pixels = [given["pixel"][i] for i in given["path"]]
     passes = zip(*(transposed(x) for x in (given["passes"], dump["W"], dump["c"], [dump["u"]])), strict=True)
-    columns = {
-        "paths.vertices": [vertices(reader, path) for path in paths],
-        "paths.scattering": [scattering(reader, path) for path in paths],
-        "paths.lights": [lights(reader, path) for path in paths],
-        "paths.leaves": [
-            {"F": [reader.F(path, leaf) for leaf in ends], "c": [reader.c(path, leaf) for leaf in ends]}
-            for path in paths
-        ],
-        "shifts.record": [record(reader, *x) for x in base],
-        "shifts": [shifted(reader, *x, to) for x, to in shifts],
-        "pass": [
-            resampled(reader, [base[i] for i in inputs], [given["pixel"][given["path"][i]] for i in inputs], *rest)
-            for inputs, *rest in passes
-        ],
-        "pairs": [pair(reader, *x, to) for x, to in shifts],
-        "mutations": [mutated(reader, *base[i]) for i in given["mutated"]],
-    }
-    return {f"{name}.{key}": last([row[key] for row in rows]) for name, rows in columns.items() for key in rows[0]}
+    yield from columns(
+        "pass", [resampled(reader, [(*base[i], pixels[i]) for i in inputs], *rest) for inputs, *rest in passes]
+    )
+    yield from columns("pairs", [pair(reader, *x) for x in shifts])
+    yield from columns("mutations", [mutated(reader, *base[i]) for i in given["mutated"]])
+
+
+def columns(name: str, rows: list[Terms]) -> Iterator[tuple[str, Any]]:
+    return ((f"{name}.{key}", last([row[key] for row in rows])) for key in rows[0])
 
 
 def transposed(rows: Any) -> Any:
@@ -46,9 +44,9 @@ def last(rows: Any) -> Any:
 
 
 def vertices(reader: Reader, path: Path) -> Terms:
-    """All paths of the files have depth + 1 vertices."""
-    assert len(path) == reader.depth + 1
-    names = {"x": "x", "n": "n", "primitive": "primitive", "r": "r", "T": "T"}
+    """No path of the files goes dark; where one does by mistake, its last vertex is repeated."""
+    path = [*path, *path[-1:] * (reader.depth + 1 - len(path))]
+    names = ("x", "n", "primitive", "r", "T")
     return {name: [getattr(v, name) for v in path] for name in names} | {"cos_o": [v.o[-1] for v in path]}
 
 
@@ -63,6 +61,10 @@ def scattering(reader: Reader, path: Path) -> Terms:
 def lights(reader: Reader, path: Path) -> Terms:
     each = [v.light for v in path[:-1]]
     return {"y": [x.y for x in each], "arrives": [int(x.p > 0) for x in each], "p": [x.p for x in each]}
+
+
+def contributions(reader: Reader, path: Path, ends: list[Leaf]) -> Terms:
+    return {"F": [reader.F(path, leaf) for leaf in ends], "c": [reader.c(path, leaf) for leaf in ends]}
 
 
 def record(reader: Reader, path: Path, leaf: Leaf) -> Terms:
@@ -111,24 +113,23 @@ def pair(reader: Reader, path: Path, leaf: Leaf, to: int) -> Terms:
     }
 
 
-def resampled(reader: Reader, base: Any, pixels: list[int], W: Any, c: Any, u: Any) -> Terms:
+def resampled(reader: Reader, inputs: Any, W: Any, c: Any, u: Any) -> Terms:
     """One pass in the first pixel; y_i goes to the pixel of input j as x_i does, for they share numbers and x_c."""
     W, c, (u,) = reader.vector(W), reader.vector(c), reader.vector(u)
-    inputs = range(len(pixels))
-    seen = [[shifted(reader, *x, to) for to in pixels] for x in base]
+    seen = [[shifted(reader, path, leaf, to) for *_, to in inputs] for path, leaf, _ in inputs]
     J = [row[0]["J"] for row in seen]
     p_hat = [reader.mean(row[0]["F"]) for row in seen]
     whole = [
         [reader.mean(x["F"]) * x["J"] / J[i] if J[i] else reader.real(0) for x in row] for i, row in enumerate(seen)
     ]
-    w = [reader.m(i, p_hat, whole, c) * p_hat[i] * W[i] * J[i] if p_hat[i] else p_hat[i] for i in inputs]
+    w = [reader.m(i, p_hat, whole, c) * p_hat[i] * W[i] * J[i] if p_hat[i] else p_hat[i] for i in range(len(W))]
     s = reader.choose(reader.shares(w), u)
     return {
         "W": W,
         "c": c,
         "p_hat": p_hat,
         "J": J,
-        "p_hat_own": [reader.mean(reader.F(*x)) for x in base],
+        "p_hat_own": [reader.mean(reader.F(path, leaf)) for path, leaf, _ in inputs],
         "p_hat_from": whole,
         "u": u,
         "w": w,
