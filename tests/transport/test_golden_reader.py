@@ -2,6 +2,7 @@
 
 import json
 import math
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -98,7 +99,7 @@ IDIOMS = [Offsets, Determinants]
 
 
 @pytest.mark.parametrize("idiom", IDIOMS)
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", [name for name, (_, golden) in SCENES.items() if golden["scene"]["balls"]])
 def test_other_ways_to_meet_a_primitive_are_within_float32(scene, idiom):
     d, golden = SCENES[scene]
     assert list(wrong(idiom(d, golden["scene"], np.float32), golden, "float32")) == []
@@ -199,12 +200,9 @@ def lobe_of_the_replay(r, head, path, leaf):
 
 
 def through_walls(r, head, path, leaf):
-    blind = but(reaches=lambda r, v, x, w: True)
-    seeing = r.__class__
-    r.__class__ = blind
-    joined = Reader.join(r, head, path, leaf)
-    r.__class__ = seeing
-    return joined
+    blind = copy(r)
+    blind.__class__ = but(reaches=lambda r, v, x, w: True)
+    return Reader.join(blind, head, path, leaf)
 
 
 def both_sides(r, primitive, *ray):
