@@ -1,0 +1,122 @@
+"""What must hold of the pages that were built: no request to anybody, no link into nowhere, a search that finds.
+
+Requests are what a browser fetches by itself: scripts, styles, pictures, fonts, frames.  Links are for people; those to
+other sites are allowed, but counted.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+FETCHED = {"script": "src", "img": "src", "source": "src", "iframe": "src", "embed": "src", "video": "src", "audio": "src", "link": "href", "object": "data", "use": "href"}
+"""Elements that make a browser fetch something, and by which attribute."""
+
+IN_STYLES = re.compile(r"(?:url\(\s*['\"]?|@import\s+['\"])((?:https?:)?//[^'\")\s]+)")
+IN_SCRIPTS = re.compile(r"(?:fetch|import|importScripts|open|src\s*=)\s*\(?\s*['\"`]((?:https?:)?//[^'\"`\s]+)")
+
+
+@dataclass(frozen=True)
+class Read:
+    """A page: what a browser fetches for it, where its links lead, and its anchors."""
+
+    fetched: tuple[str, ...]
+    links: tuple[str, ...]
+    anchors: frozenset[str]
+
+
+class _Reader(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.fetched: list[str] = []
+        self.links: list[str] = []
+        self.anchors: set[str] = set()
+        self.within = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = {name: value or "" for name, value in attrs}
+        self.anchors |= {found[name] for name in ("id", "name") if found.get(name)}
+        if tag == "a" and "href" in found:
+            self.links.append(found["href"])
+        if tag in FETCHED and found.get(FETCHED[tag]):
+            self.fetched.append(found[FETCHED[tag]])
+        self.fetched += [part.split()[0] for part in found.get("srcset", "").split(",") if part.strip()]
+        self.fetched += IN_STYLES.findall(found.get("style", ""))
+        self.within = tag if tag in ("style", "script") else ""
+
+    def handle_endtag(self, tag: str) -> None:
+        self.within = ""
+
+    def handle_data(self, data: str) -> None:
+        if self.within:
+            self.fetched += (IN_STYLES if self.within == "style" else IN_SCRIPTS).findall(data)
+
+
+def read(text: str) -> Read:
+    """A page of HTML, read."""
+    reader = _Reader()
+    reader.feed(text)
+    return Read(tuple(reader.fetched), tuple(reader.links), frozenset(reader.anchors))
+
+
+@cache
+def site(folder: Path) -> Mapping[str, Read]:
+    """All pages of a folder by their paths."""
+    files = sorted(folder.rglob("*.html"))
+    return {file.relative_to(folder).as_posix(): read(file.read_text(encoding="utf-8")) for file in files}
+
+
+def abroad(url: str) -> bool:
+    """Whether a URL leads to another host."""
+    return bool(urlsplit(url).netloc) or urlsplit(url).scheme in ("http", "https", "ftp", "ws", "wss")
+
+
+def requests(folder: Path) -> list[str]:
+    """What pages, styles and scripts would fetch from other hosts, each with the file that does."""
+    found = [f"{name} fetches {url}" for name, page in site(folder).items() for url in page.fetched if abroad(url)]
+    for file in sorted([*folder.rglob("*.css"), *folder.rglob("*.js")]):
+        text = file.read_text(encoding="utf-8", errors="replace")
+        pattern = IN_STYLES if file.suffix == ".css" else IN_SCRIPTS
+        found += [f"{file.relative_to(folder).as_posix()} fetches {url}" for url in pattern.findall(text)]
+    return found
+
+
+def broken(folder: Path) -> list[str]:
+    """Links and fetched files that lead nowhere, each with its page."""
+    return [f"{name} -> {url}" for name, page in site(folder).items() for url in _lost(folder, name, page)]
+
+
+def _lost(folder: Path, name: str, page: Read) -> Iterator[str]:
+    for url in dict.fromkeys([*page.links, *page.fetched]):
+        parts = urlsplit(url)
+        if parts.scheme or parts.netloc:
+            continue
+        target = (folder / name).parent / unquote(parts.path) if parts.path else folder / name
+        target = target.resolve()
+        if not target.is_file():
+            yield url
+        elif parts.fragment and target.suffix == ".html":
+            there = site(folder).get(target.relative_to(folder.resolve()).as_posix())
+            if there is None or unquote(parts.fragment) not in there.anchors:
+                yield url
+
+
+def index(folder: Path) -> Mapping[str, object]:
+    """What the search of a site looks things up in."""
+    text = (folder / "searchindex.js").read_text(encoding="utf-8")
+    found: Mapping[str, object] = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
+    return found
+
+
+def searched(folder: Path, word: str) -> list[str]:
+    """The pages on which a search for one word finds it: in the names of functions first, then in texts."""
+    found: Mapping[str, object] = index(folder)
+    names, terms = found["docnames"], found["terms"]
+    named = [names[each[0]] for prefix, held in found["objects"].items() for each in held if word in each[4].lower() or word in prefix]  # type: ignore[attr-defined, index]
+    stems = [stem for stem in terms if word.startswith(stem) and len(stem) > 2]  # type: ignore[attr-defined, union-attr]
+    places = terms[max(stems, key=len)] if stems else []  # type: ignore[index]
+    return list(dict.fromkeys([*named, *(names[each] for each in ([places] if isinstance(places, int) else places))]))  # type: ignore[index]

@@ -1,0 +1,88 @@
+"""Sphinx's settings: what is documented how, and nothing that a reader's browser would have to fetch."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from docs.site import api, code, layout, mathml, words
+
+project = "restir-ref"
+author = "the restir-ref authors"
+copyright = "the restir-ref authors, BSD-3-Clause"  # noqa: A001  (Sphinx calls it so)
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.linkcode"]
+root_doc = "index"
+templates_path = [str(Path(__file__).parent / "templates")]
+
+myst_enable_extensions = ["dollarmath", "deflist", "attrs_inline"]
+myst_heading_anchors = 4
+myst_all_links_external = False
+
+autosummary_generate = False
+autodoc_default_options = {"members": True, "member-order": "bysource", "undoc-members": True, "no-value": True}
+autodoc_preserve_defaults = True
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+python_maximum_signature_line_length = 100
+python_use_unqualified_type_names = True
+toc_object_entries = False
+
+html_theme = "furo"
+html_title = "restir-ref"
+html_static_path = [str(Path(__file__).parent / "static")]
+html_css_files = ["site.css"]
+html_math_renderer = "mathml"
+html_copy_source = False
+html_show_sourcelink = False
+html_show_sphinx = False
+html_theme_options: dict[str, Any] = {"footer_icons": [], "navigation_with_keys": False}
+html_sidebars = {
+    "**": ["sidebar/brand.html", "sidebar/search.html", "sidebar/scroll-start.html", "sidebar/navigation.html", "sidebar/scroll-end.html"]
+}
+html_search_language = "en"
+
+ARRAY = re.compile(r"(?:numpy\.)?ndarray\[tuple\[(?:Any|int), \.\.\.\], dtype\[Any\]\]|NDArray\[Any\]")
+
+
+def docstring(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """A docstring as this project writes it, in reStructuredText; that of a module stands on its page already."""
+    module = api.owner(name)
+    found = [] if what == "module" else words.rst("\n".join(lines), layout.module_place(module), api.resolver(module))
+    lines[:] = found
+
+
+def signature(  # noqa: PLR0917  (Sphinx calls it so)
+    app: Sphinx, what: str, name: str, obj: Any, options: Any, said: str | None, returns: str | None
+) -> tuple[str | None, str | None]:
+    """A signature in which arrays are called so."""
+    return tuple(ARRAY.sub("Array", each) if each else each for each in (said, returns))  # type: ignore[return-value]
+
+
+def unsaid(app: Sphinx, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:  # noqa: FBT001
+    """Names of a module that have no docstring are types and constants of its own: left out."""
+    return True if what == "module" and not getattr(obj, "__doc__", "") else None
+
+
+def linkcode_resolve(domain: str, info: dict[str, str]) -> str | None:
+    """From an entry to its line in the code, as seen from a page of the reference."""
+    module = layout.modules().get(info["module"])
+    full = f"{info['module']}.{info['fullname']}"
+    line = next((each.line for each in module.holds if each.name == full), 0) if module else 0
+    return layout.way(api.INDEX, layout.code_place(module.path, line)) if module and line else None
+
+
+def setup(app: Sphinx) -> None:
+    """What this site adds to Sphinx."""
+    app.add_html_math_renderer("mathml", (mathml.inline, None), (mathml.block, None))
+    app.connect("autodoc-process-docstring", docstring)
+    app.connect("autodoc-process-signature", signature)
+    app.connect("autodoc-skip-member", unsaid)
+    app.connect("html-collect-pages", lambda app: code.pages())
