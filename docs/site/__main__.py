@@ -5,7 +5,7 @@ import sys
 import time
 from pathlib import Path
 
-from docs.site import check, layout, stage
+from docs.site import check, code, layout, stage
 
 
 def main() -> int:
@@ -17,6 +17,8 @@ def main() -> int:
     count = stage.write(out / "source")
     print(f"{count} pages staged in {time.perf_counter() - start:.0f} s", flush=True)
     status = laid_out(out)
+    if status == 0:
+        print(f"{code.write(out / 'html')} files of code shown", flush=True)
     problems = [*check.requests(out / "html"), *check.broken(out / "html")] if status == 0 else []
     for line in problems:
         print(f"docs: {line}")
@@ -29,7 +31,7 @@ def laid_out(out: Path) -> int:
     from sphinx.cmd.build import build_main  # noqa: PLC0415  (the extra `docs`)
 
     own, tree = str(Path(__file__).parent), str(out / "doctrees")
-    options = ["-b", "html", "-q", "-W", "--keep-going", "-c", own, "-d", tree]
+    options = ["-b", "html", "-q", "-W", "--keep-going", "-j", "auto", "-c", own, "-d", tree]
     return build_main([*options, str(out / "source"), str(out / "html")])
 
 

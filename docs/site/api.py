@@ -115,6 +115,9 @@ def pages() -> Iterator[tuple[str, str]]:
         yield f"api/{module.name}.rst", "\n".join(page(module))
 
 
+FEW = 6
+"""Modules in a group whose contents are listed as well."""
+
 APART = (":orphan:", "")
 """Such a page stands in an index of its own, not in the list beside every page."""
 
@@ -191,9 +194,6 @@ def _source(row: Row, here: str) -> Iterator[str]:
         yield from [words.inline(_without_markup(row.source), here, lambda _: ""), ""]
 
 
-FEW = 6
-
-
 def _group(names: Sequence[str]) -> Iterator[str]:
     """Modules with their first sentences; of few of them also what they hold."""
     found = [layout.modules()[name] for name in names]
@@ -226,16 +226,15 @@ def owner(name: str) -> str:
 
 
 def shown_by(row: Row) -> list[Named]:
-    """What a row of the README points at: what in its modules cites its source, or all they hold at top level."""
+    """What a row of the README points at: what in its modules cites its source, then what else few modules hold."""
     wanted = [(paper, number) for paper, inside in CITED.findall(row.source) for number in numbers(inside)]
     cited = {each.name: each for key in wanted for each in citing().get(key, ()) if owner(each.name) in row.modules}
-    if cited:
-        return list(cited.values())
     held = [(name, each) for name in row.modules for each in layout.modules()[name].holds]
-    return [each for name, each in held if each.name.count(".") == name.count(".") + 1]
+    top = {each.name: each for name, each in held if each.name.count(".") == name.count(".") + 1}
+    return list((cited if cited and len(row.modules) > FEW // 2 else cited | top).values())
 
 
-MOST = 12
+MOST = 16
 
 
 def equations() -> Iterator[str]:

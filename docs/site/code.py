@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from html import escape
-from typing import Any
+from pathlib import Path
 
 from pygments import highlight
 from pygments.formatters import HtmlFormatter
@@ -13,16 +13,36 @@ from docs.site import layout
 LEXERS = {".py": "python", ".md": "markdown", ".toml": "toml", ".json": "json", ".css": "css", ".cff": "yaml"}
 
 
-def pages() -> Iterator[tuple[str, dict[str, Any], str]]:
-    """Place without ending, what the template needs, and the template, as Sphinx collects pages."""
+PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title} - restir-ref</title>
+<link rel="stylesheet" href="{up}_static/pygments.css">
+<link rel="stylesheet" href="{up}_static/site.css">
+</head>
+<body class="code">
+<p><a href="{up}index.html">restir-ref</a> / <a href="{up}code/index.html">code</a> / {title}</p>
+{body}
+</body>
+</html>
+"""
+
+
+def write(folder: Path) -> int:
+    """Write the pages of code into a site; their number."""
     listed = [path for path in layout.files() if layout.listed(path)]
     for path in listed:
-        yield f"code/{path}", {"title": path, "body": shown(path), "index_of_code": _up(path)}, "code.html"
-    yield "code/index", {"title": "The code", "body": "".join(index(listed)), "index_of_code": ""}, "code.html"
+        _page(folder / f"code/{path}.html", path, shown(path))
+    _page(folder / "code/index.html", "all files", "".join(index(listed)))
+    return len(listed)
 
 
-def _up(path: str) -> str:
-    return layout.way(f"code/{path}.html", "code/index.html")
+def _page(file: Path, title: str, body: str) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    up = "../" * (1 + (title.count("/") if file.stem != "index" else 0))
+    file.write_text(PAGE.format(title=escape(title), body=body, up=up), encoding="utf-8")
 
 
 def shown(path: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,12 @@ if TYPE_CHECKING:
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from docs.site import api, code, layout, mathml, words
+import sphinx.ext.autodoc
+import sphinx.util.inspect
+import sphinx.util.typing as typing_of_sphinx
+
+from docs.site import api, layout, mathml, words
+from restir_ref.batch import Array
 
 project = "restir-ref"
 author = "the restir-ref authors"
@@ -20,7 +24,6 @@ copyright = "the restir-ref authors, BSD-3-Clause"  # noqa: A001  (Sphinx calls 
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.linkcode"]
 root_doc = "index"
-templates_path = [str(Path(__file__).parent / "templates")]
 
 myst_enable_extensions = ["dollarmath", "deflist", "attrs_inline"]
 myst_heading_anchors = 4
@@ -49,7 +52,17 @@ html_sidebars = {
 }
 html_search_language = "en"
 
-ARRAY = re.compile(r"(?:numpy\.)?ndarray\[tuple\[(?:Any|int), \.\.\.\], dtype\[Any\]\]|NDArray\[Any\]")
+
+
+def arrays(annotation: Any, /, *args: Any, **options: Any) -> str:
+    """A type in words; arrays of anything are called Array, as in the code."""
+    return "Array" if annotation == Array else in_words(annotation, *args, **options)
+
+
+in_words = typing_of_sphinx.stringify_annotation
+for each in [module for name, module in sys.modules.items() if name.startswith("sphinx.")]:
+    if vars(each).get("stringify_annotation") is in_words:
+        each.stringify_annotation = arrays  # type: ignore[attr-defined]
 
 
 def docstring(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
@@ -59,16 +72,10 @@ def docstring(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: 
     lines[:] = found
 
 
-def signature(  # noqa: PLR0917  (Sphinx calls it so)
-    app: Sphinx, what: str, name: str, obj: Any, options: Any, said: str | None, returns: str | None
-) -> tuple[str | None, str | None]:
-    """A signature in which arrays are called so."""
-    return tuple(ARRAY.sub("Array", each) if each else each for each in (said, returns))  # type: ignore[return-value]
-
-
 def unsaid(app: Sphinx, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:  # noqa: FBT001
-    """Names of a module that have no docstring are types and constants of its own: left out."""
-    return True if what == "module" and not getattr(obj, "__doc__", "") else None
+    """Names of a module that have no docstring and are no constants are types of its own: left out."""
+    said = getattr(obj, "__doc__", "") or name.isupper()
+    return True if what == "module" and not said else None
 
 
 def linkcode_resolve(domain: str, info: dict[str, str]) -> str | None:
@@ -83,6 +90,4 @@ def setup(app: Sphinx) -> None:
     """What this site adds to Sphinx."""
     app.add_html_math_renderer("mathml", (mathml.inline, None), (mathml.block, None))
     app.connect("autodoc-process-docstring", docstring)
-    app.connect("autodoc-process-signature", signature)
     app.connect("autodoc-skip-member", unsaid)
-    app.connect("html-collect-pages", lambda app: code.pages())

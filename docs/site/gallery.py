@@ -191,6 +191,7 @@ def _claims(entry: Entry) -> Iterator[str]:
 def _claim(id_: str, checks: Sequence[Mapping[str, Any]], here: str) -> Iterator[str]:
     row = claims()[id_]
     yield from heading(f"{id_}, {row.source}", "~")
+    yield from [f"`Who shows it <../{words.claim_place(id_)}>`__", ""]
     yield from [words.plain(row.sentence), "", f"*Criterion:* {words.plain(row.criterion)}.", ""]
     if checks:
         yield from [".. list-table::", "   :header-rows: 1", "   :widths: 22 38 20 20", "   :class: claims", ""]
@@ -200,28 +201,18 @@ def _claim(id_: str, checks: Sequence[Mapping[str, Any]], here: str) -> Iterator
         measured = show(check["measured"]) if check["verdict"] != "not judged" else ""
         yield f"   * - {SYMBOLS[check['verdict']]} {check['verdict']}"
         yield from (f"     - {words.plain(' '.join(each.split())) or ' '}" for each in (". ".join(filter(None, notes)), measured, check["criterion"]))
-    yield from ["", *_tests(id_, here)]
+    yield from ["", *tests(id_, here)]
 
 
-def _tests(id_: str, here: str) -> Iterator[str]:
+def tests(id_: str, here: str) -> Iterator[str]:
+    """The tests that show a claim, with the parts that they show."""
     names = [each for each in shown_by().get(id_, ()) if each.kind == "tests"]
     for each in names:
         path, _, name = each.name.partition("::")
-        to = layout.way(here, layout.code_place(path, line_of(path, name)))
+        to = layout.way(here, layout.code_place(path, words.line_of(path, name)))
         part = f" ({each.part})" if each.part else ""
         yield f"- `{words.plain(each.name)} <{to}>`__{words.plain(part)}"
     yield ""
-
-
-@cache
-def _lines(path: str) -> tuple[str, ...]:
-    return tuple((layout.ROOT / path).read_text(encoding="utf-8").splitlines())
-
-
-def line_of(path: str, name: str) -> int:
-    """The line of a file in which a function begins; 0 if there is none of that name."""
-    start = f"def {name.partition('[')[0]}("
-    return next((k for k, line in enumerate(_lines(path), start=1) if line.strip().startswith(start)), 0)
 
 
 def _conditions(conditions: Sequence[Conditions]) -> Iterator[str]:

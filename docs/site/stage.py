@@ -4,7 +4,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from docs.site import api, evidence, gallery, layout, symptoms, words
+from docs.site import api, claims, evidence, gallery, layout, symptoms, words
 
 OWN = Path(__file__).resolve().parent
 SPECIAL = {"docs/evidence.md": evidence.page, "docs/symptoms.md": symptoms.page}
@@ -17,6 +17,7 @@ def pages() -> Iterator[tuple[str, str]]:
         yield f"{place}.md", SPECIAL[path]() if path in SPECIAL else page(path, place)
     yield from api.pages()
     yield from gallery.pages()
+    yield from claims.pages()
 
 
 def page(path: str, place: str) -> str:
@@ -35,7 +36,6 @@ def pictures() -> Iterator[tuple[str, Path]]:
     for name in layout.files():
         if name.startswith("docs/") and name.endswith(".png"):
             yield name.removeprefix("docs/"), layout.ROOT / name
-            yield name, layout.ROOT / name  # as the README, which is a page at the root, names it
     yield from gallery.pictures()
 
 

@@ -11,6 +11,7 @@ from functools import cache
 from html import escape
 
 from docs.site import layout
+from figures.claims import ledger
 
 Resolve = Callable[[str], str]
 """A name in backticks -> the full name of what it means, empty if it means nothing public."""
@@ -91,9 +92,10 @@ def _block(block: list[str], here: str, resolve: Resolve) -> list[str]:
     if BULLET.match(block[0]):
         items = re.split(r"\n(?=- )", "\n".join(block))
         return [f"- {inline(_joined(item[2:]), here, resolve)}" for item in items]
+    if block[0].startswith("# erratum: "):
+        said = _joined(" ".join(line.removeprefix("# ") for line in block)).removeprefix("erratum: ")
+        return [".. admonition:: Erratum", "", f"   {inline(said, here, resolve)}"]
     said = _joined(" ".join(block))
-    if said.startswith("# erratum: "):
-        return [".. admonition:: Erratum", "", f"   {inline(said.removeprefix('# erratum: '), here, resolve)}"]
     return [("\\ " if LIKE_A_LIST.match(said) else "") + inline(said, here, resolve)]
 
 
@@ -130,10 +132,43 @@ def _linked(words: str, there: str) -> str:
 # ---------------------------------------------------------------- files in words
 
 
+@cache
+def claims() -> frozenset[str]:
+    """The ids of the ledger."""
+    return frozenset(ledger.load(layout.ROOT / "figures" / "ledger.json"))
+
+
+def claim_place(id_: str) -> str:
+    """Where a claim of the ledger stands."""
+    return f"claims/{id_.partition('-')[0]}.html#{id_}"
+
+
 def place_of_words(code: str) -> str:
-    """The page of a file that is named as such, `restir_ref/mis.py`; empty for other words."""
+    """The page of a file, `restir_ref/mis.py`, of a test in one, `tests/x.py::test_y`, or of a claim; else empty.
+
+    Raises ValueError for a test that is not in its file.
+    """
+    if code in claims():
+        return claim_place(code)
+    path, _, name = code.partition("::")
     looks = "/" in code or code.endswith((".md", ".py", ".toml", ".json", ".cff"))
+    if name and path in layout.files():
+        return layout.code_place(path, line_of(path, name))
     return layout.place(code) if looks and " " not in code and "*" not in code else ""
+
+
+def line_of(path: str, name: str) -> int:
+    """The line of a file in which a function begins.  Raises ValueError if there is none of that name."""
+    lines, start = _lines(path), f"def {name.partition('[')[0]}("
+    found = [k for k, line in enumerate(lines, start=1) if line.strip().startswith(start)]
+    if not found:
+        raise ValueError(f"{path} has no function {name}: mend the name, or what is said of it.")
+    return found[0]
+
+
+@cache
+def _lines(path: str) -> tuple[str, ...]:
+    return tuple((layout.ROOT / path).read_text(encoding="utf-8").splitlines())
 
 
 def spread(code: str) -> list[str]:
@@ -197,17 +232,19 @@ def _short(code: str) -> list[str]:
 
 def _link(found: re.Match[str], path: str, here: str) -> str:
     to, words = found["to"], found["words"]
-    if to.startswith(("http:", "https:", "mailto:")) or found["image"]:
+    if to.startswith(("http:", "https:", "mailto:")):
         return found[0]
-    name, _, mark = to.partition("#")
+    name, _, there = to.partition("#")
     target = posixpath.normpath(posixpath.join(posixpath.dirname(path), name)) if name else path
+    if found["image"]:
+        return f"![{words}]({layout.way(here, target.removeprefix('docs/'))})"
     if target in layout.pages():
-        page = posixpath.relpath(f"{layout.pages()[target]}.md", posixpath.dirname(here) or ".")
-        return f"[{_prose(words, path, here) if '`' not in words else words}]({page if name else ''}{'#' + mark if mark else ''})"
-    there = layout.place(target)
-    if not there:
+        page = layout.way(here, f"{layout.pages()[target]}.md") if name else ""
+        return f"[{words}]({page}{'#' * bool(there)}{there})"
+    place = layout.place(target)
+    if not place:
         raise ValueError(f"{path} links {to}, which is no file of the checkout that the site shows: mend the link.")
-    return html_link(_spans(words), layout.way(here, there))
+    return html_link(_spans(words), layout.way(here, place))
 
 
 def _spans(words: str) -> str:
