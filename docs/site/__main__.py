@@ -32,7 +32,8 @@ def laid_out(out: Path) -> int:
 
     own, tree = str(Path(__file__).parent), str(out / "doctrees")
     options = ["-b", "html", "-q", "-W", "--keep-going", "-j", "auto", "-c", own, "-d", tree]
-    return build_main([*options, str(out / "source"), str(out / "html")])
+    status: int = build_main([*options, str(out / "source"), str(out / "html")])
+    return status
 
 
 if __name__ == "__main__":

@@ -18,6 +18,14 @@ from figures.report.sources import CITED, numbers
 
 INDEX, EQUATIONS = "api/index.html", "equations.html"
 PAPERS = ("GRIS", "GPT", "DDGIR", "MCMC")
+GROUPED = (
+    "Grouped as the table of equations and files in the :doc:`README </readme>`; where a single equation is, says "
+    ":doc:`/equations`. Batches are the last axis, see :doc:`/notation`."
+)
+TOLD = (
+    "The README's table, each row with the functions that say its equations; below, every equation, theorem and "
+    "section of a paper that a docstring cites. The keys are explained in :doc:`references`."
+)
 REST = "what the others are made of"
 
 
@@ -168,11 +176,7 @@ def modules_in(modules: Sequence[Module], here: str) -> Iterator[str]:
 def index() -> Iterator[str]:
     """All modules, in the order of the README's table."""
     yield from heading("API reference")
-    yield from [
-        "Grouped as the table of equations and files in the :doc:`README </readme>`; where a single equation is, "
-        "says :doc:`/equations`. Shapes and conventions: batches are the last axis, see :doc:`/notation`.",
-        "",
-    ]
+    yield from [GROUPED, ""]
     seen: set[str] = set()
     for row in rows():
         named = [name for name in row.modules if name not in seen]
@@ -241,8 +245,7 @@ def equations() -> Iterator[str]:
     """The README's table with the functions of each row, then paper by paper who cites what."""
     yield from heading("Equation to function")
     yield from [
-        "The README's table, each row with the functions that say its equations; below, every equation, theorem and "
-        "section of a paper that a docstring cites. The keys are explained in :doc:`references`.",
+        TOLD,
         "",
         ".. list-table::",
         "   :header-rows: 1",

@@ -11,9 +11,21 @@ from dataclasses import dataclass
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
-FETCHED = {"script": "src", "img": "src", "source": "src", "iframe": "src", "embed": "src", "video": "src", "audio": "src", "link": "href", "object": "data", "use": "href"}
+FETCHED = {
+    "script": "src",
+    "img": "src",
+    "source": "src",
+    "iframe": "src",
+    "embed": "src",
+    "video": "src",
+    "audio": "src",
+    "link": "href",
+    "object": "data",
+    "use": "href",
+}
 """Elements that make a browser fetch something, and by which attribute."""
 
 IN_STYLES = re.compile(r"(?:url\(\s*['\"]?|@import\s+['\"])((?:https?:)?//[^'\")\s]+)")
@@ -110,18 +122,27 @@ def _lost(folder: Path, name: str, page: Read) -> Iterator[str]:
                 yield url
 
 
-def index(folder: Path) -> Mapping[str, object]:
-    """What the search of a site looks things up in."""
+@dataclass(frozen=True)
+class Index:
+    """What a site's search looks things up in: names of pages, stems of words, and names of functions with pages."""
+
+    pages: tuple[str, ...]
+    stems: Mapping[str, tuple[int, ...]]
+    functions: Mapping[str, int]
+
+
+def index(folder: Path) -> Index:
+    """The index of a site."""
     text = (folder / "searchindex.js").read_text(encoding="utf-8")
-    found: Mapping[str, object] = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
-    return found
+    found: dict[str, Any] = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
+    stems = {stem: (at,) if isinstance(at, int) else tuple(at) for stem, at in found["terms"].items()}
+    held = {f"{prefix}.{each[4]}": each[0] for prefix, objects in found["objects"].items() for each in objects}
+    return Index(tuple(found["docnames"]), stems, held)
 
 
 def searched(folder: Path, word: str) -> list[str]:
-    """The pages on which a search for one word finds it: in the names of functions first, then in texts."""
-    found: Mapping[str, object] = index(folder)
-    names, terms = found["docnames"], found["terms"]
-    named = [names[each[0]] for prefix, held in found["objects"].items() for each in held if word in each[4].lower() or word in prefix]  # type: ignore[attr-defined, index]
-    stems = [stem for stem in terms if word.startswith(stem) and len(stem) > 2]  # type: ignore[attr-defined, union-attr]
-    places = terms[max(stems, key=len)] if stems else []  # type: ignore[index]
-    return list(dict.fromkeys([*named, *(names[each] for each in ([places] if isinstance(places, int) else places))]))  # type: ignore[index]
+    """The pages on which a search for one word finds it: in the last part of functions' names first, then in texts."""
+    found = index(folder)
+    named = [at for name, at in found.functions.items() if word in name.rpartition(".")[2].lower()]
+    stem = max((stem for stem in found.stems if word.startswith(stem)), key=len, default="")
+    return list(dict.fromkeys(found.pages[at] for at in (*named, *found.stems.get(stem, ()))))

@@ -6,10 +6,16 @@ from functools import cache
 from docs.site import gallery, layout, words
 from docs.site.api import APART, heading
 from figures.claims import showings
+from figures.claims.figure import Verdict
 from figures.claims.ledger import Row
 from figures.engine import kept, registry
 from figures.report.glossary import PAPERS
 from figures.report.markup import SYMBOLS
+
+TOLD = (
+    "A claim is one sentence of a paper made into a number and a criterion that could fail. Verdicts are those of kept "
+    "runs at the paper preset; claims that no figure is about are shown by tests alone."
+)
 
 
 def pages() -> Iterator[tuple[str, str]]:
@@ -23,8 +29,7 @@ def index() -> Iterator[str]:
     """The papers, with how many claims each has."""
     yield from heading("Claims")
     yield from [
-        "A claim is one sentence of a paper made into a number and a criterion that could fail. Verdicts are those of "
-        "kept runs at the paper preset; claims that no figure is about are shown by tests alone.",
+        TOLD,
         "",
         ".. list-table::",
         "   :header-rows: 1",
@@ -57,7 +62,7 @@ def _ids(paper: str) -> list[str]:
 
 
 @cache
-def _verdicts() -> dict[str, str]:
+def _verdicts() -> dict[str, Verdict]:
     return dict(kept.verdicts(gallery.runs(), registry.declared(gallery.entries())))
 
 
@@ -65,7 +70,7 @@ def _claim(row: Row, here: str) -> Iterator[str]:
     yield from [".. raw:: html", "", f'   <span id="{row.id}"></span>', ""]
     yield from heading(f"{row.id}, {row.source}", "-")
     yield from [words.plain(row.sentence), "", f"*Criterion:* {words.plain(row.criterion)}.", ""]
-    verdict = _verdicts().get(row.id, "")
+    verdict = _verdicts().get(row.id)
     yield from [f"*Verdict:* {SYMBOLS[verdict]} {verdict}.", ""] if verdict else []
     found = gallery.shown_by().get(row.id, ())
     figures = [f":doc:`{name} </figures/{name}>`" for name in showings.names(found, "figures")]

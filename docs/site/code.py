@@ -61,5 +61,8 @@ def index(listed: list[str]) -> Iterator[str]:
         folders.setdefault(path.rpartition("/")[0], []).append(path)
     for folder, names in sorted(folders.items()):
         yield f'<h2 id="{escape(folder)}">{escape(folder) or "The checkout"}</h2>\n<ul>'
-        yield from (f'<li><a href="{escape(layout.way("code/index.html", f"code/{n}.html"))}">{escape(n)}</a></li>' for n in names)
+        yield from (
+            f'<li><a href="{escape(layout.way("code/index.html", f"code/{n}.html"))}">{escape(n)}</a></li>'
+            for n in names
+        )
         yield "</ul>\n"

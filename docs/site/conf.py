@@ -11,8 +11,7 @@ if TYPE_CHECKING:
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-import sphinx.ext.autodoc
-import sphinx.util.inspect
+import sphinx.ext.autodoc  # noqa: F401  before names of its modules are replaced below
 import sphinx.util.typing as typing_of_sphinx
 
 from docs.site import api, layout, mathml, words
@@ -47,11 +46,9 @@ html_copy_source = False
 html_show_sourcelink = False
 html_show_sphinx = False
 html_theme_options: dict[str, Any] = {"footer_icons": [], "navigation_with_keys": False}
-html_sidebars = {
-    "**": ["sidebar/brand.html", "sidebar/search.html", "sidebar/scroll-start.html", "sidebar/navigation.html", "sidebar/scroll-end.html"]
-}
+SIDEBAR = ("brand", "search", "scroll-start", "navigation", "scroll-end")
+html_sidebars = {"**": [f"sidebar/{part}.html" for part in SIDEBAR]}
 html_search_language = "en"
-
 
 
 def arrays(annotation: Any, /, *args: Any, **options: Any) -> str:

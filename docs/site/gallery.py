@@ -28,6 +28,11 @@ RESULTS = ("out-paper", "out")
 """Folders of results below the checkout, the best one first."""
 
 COMMITTED = layout.ROOT / "docs" / "figures"
+GALLERY = (
+    "Every figure that ``make figures`` draws, with what it claims and how that came out when the paper preset was "
+    "run. How to run one: ``python -m figures run GRIS-F07``; what verdicts mean: "
+    "`claims and the ledger <../contributing.html#claims-and-the-ledger>`__."
+)
 SETUP = ("loop", "camera", "light", "view")
 
 
@@ -104,12 +109,7 @@ def _wings() -> dict[str, list[str]]:
 def gallery() -> Iterator[str]:
     """All figures, paper by paper."""
     yield from heading("Figures")
-    yield from [
-        "Every figure that `make figures` draws, with what it claims and how that came out when the paper preset was "
-        "run. How to run one: ``python -m figures run GRIS-F07``; what verdicts mean: "
-        "`the ledger <../contributing.html#claims-and-the-ledger>`__.".replace("`make figures`", "``make figures``"),
-        "",
-    ]
+    yield from [GALLERY, ""]
     for wing, ids in _wings().items():
         yield from heading(_title_of(wing), "-")
         yield from [".. list-table::", "   :widths: 22 48 30", "   :class: gallery", ""]
@@ -199,8 +199,9 @@ def _claim(id_: str, checks: Sequence[Mapping[str, Any]], here: str) -> Iterator
     for check in checks:
         notes = [check["part"], *(f"{name}: {check[name]}" for name in ("caveat", "reason") if check[name])]
         measured = show(check["measured"]) if check["verdict"] != "not judged" else ""
+        cells = (". ".join(filter(None, notes)), measured, check["criterion"])
         yield f"   * - {SYMBOLS[check['verdict']]} {check['verdict']}"
-        yield from (f"     - {words.plain(' '.join(each.split())) or ' '}" for each in (". ".join(filter(None, notes)), measured, check["criterion"]))
+        yield from (f"     - {words.plain(' '.join(each.split())) or ' '}" for each in cells)
     yield from ["", *tests(id_, here)]
 
 

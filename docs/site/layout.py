@@ -21,7 +21,12 @@ TEXTS = {".py", ".md", ".toml", ".json", ".css", ".txt", ".cff", ".hlsl", ".ipyn
 LARGEST = 400_000
 """Bytes of the largest file that gets a page of code."""
 
-ALONE = {"README.md": "readme", "CONTRIBUTING.md": "contributing", "CHANGELOG.md": "changelog", "docs/site/index.md": "index"}
+ALONE = {
+    "README.md": "readme",
+    "CONTRIBUTING.md": "contributing",
+    "CHANGELOG.md": "changelog",
+    "docs/site/index.md": "index",
+}
 
 
 @cache

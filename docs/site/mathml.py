@@ -28,7 +28,7 @@ def block(self: HTML5Translator, node: nodes.math_block) -> None:
 
 def written(latex: str, display: str) -> str:
     """LaTeX as MathML.  Raises ValueError for a command that is not known and would be shown as its name."""
-    found = convert(SIZES.sub("", latex.strip()), display=display)
+    found: str = convert(SIZES.sub("", latex.strip()), display=display)
     unknown = re.findall(r"\\[a-zA-Z]+", re.sub(r"<annotation.*?</annotation>", "", found, flags=re.DOTALL))
     if unknown:
         raise ValueError(f"the formula {latex!r} has {unknown}, which MathML is not made of: write it otherwise.")
