@@ -76,15 +76,19 @@ def read(text: str) -> Read:
 
 
 def read_code(text: str) -> Read:
-    """A page of code, which is long, and of our own making: its text is escaped, so that every mark is one."""
-    return Read((), tuple(re.findall(r' href="([^"]*)"', text)), frozenset(re.findall(r' (?:id|name)="([^"]*)"', text)))
+    """A page of code, which is long, and whose few links are the same on every one of them: its lines."""
+    return Read((), (), frozenset(re.findall(r' id="(L-\d+)"', text)))
 
 
 @cache
 def site(folder: Path) -> Mapping[str, Read]:
     """All pages of a folder by their paths."""
     files = {file.relative_to(folder).as_posix(): file.read_text(encoding="utf-8") for file in folder.rglob("*.html")}
-    return {name: (read_code if name.startswith("code/") else read)(files[name]) for name in sorted(files)}
+    return {name: (read_code if _is_code(name) else read)(files[name]) for name in sorted(files)}
+
+
+def _is_code(name: str) -> bool:
+    return name.startswith("code/") and name != "code/index.html"
 
 
 def abroad(url: str) -> bool:
