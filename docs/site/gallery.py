@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from docs.site import layout, words
-from docs.site.api import APART, heading, resolver
+from docs.site.api import APART, citing, heading, resolver
+from docs.site.api import entry as api_entry
 from figures.claims import ledger, showings
 from figures.claims.criteria import show
 from figures.claims.figure import Conditions, Entry
@@ -21,7 +22,7 @@ from figures.engine import kept, registry
 from figures.engine.kept import Kept
 from figures.project import Project
 from figures.report.markup import SYMBOLS, two_sentences
-from figures.report.sources import about, cited, numbers
+from figures.report.sources import about, numbers
 
 HERE = Project()
 RESULTS = ("out-paper", "out")
@@ -234,10 +235,7 @@ def _conditions(conditions: Sequence[Conditions]) -> Iterator[str]:
 def _code(entry: Entry, here: str) -> Iterator[str]:
     path = entry.module.replace(".", "/") + ".py"
     yield f"- Module: `{words.plain(path)} <{layout.way(here, layout.code_place(path))}>`__"
-    known = cited(layout.ROOT)
     rows = [claims()[id_] for id_ in entry.figure.claims]
-    places = [place for row in rows for number in numbers(row.source) for place in known.get((row.paper, number), ())]
-    for place in dict.fromkeys(places):
-        to = layout.way(here, layout.code_place(place.path, place.line))
-        yield f"- `{words.plain(place.name)} <{to}>`__, {words.plain(place.path)}"
-    yield ""
+    found = [each for row in rows for number in numbers(row.source) for each in citing().get((row.paper, number), ())]
+    said = ", ".join(api_entry(each) for each in dict.fromkeys(found))
+    yield from [f"- Says the equations: {said}", ""] if said else [""]

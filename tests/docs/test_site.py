@@ -3,9 +3,13 @@
 import re
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
 
-from docs.site import api, check, code, evidence, gallery, layout, stage, words
+from docs.site import api, check, code, evidence, gallery, layout, planted, stage, symptoms, words
+from restir_ref import Live, Pixels, initial
+from restir_ref.oracle.zoo import BUGS, INEFFICIENT
+from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from tests.checkout import ROOT, plant
 
 BUILT = ROOT / "out-docs" / "html"
@@ -145,6 +149,48 @@ def test_the_worst_z_is_of_rows_that_ask_for_a_small_one() -> None:
     assert evidence.worst_z(rows) == pytest.approx(3)
     assert evidence.worst_error(rows) == 0.01
     assert evidence.worst_z(rows[2:]) == evidence.worst_error(rows[2:]) == 0
+
+
+# ---------------------------------------------------------------- symptoms
+
+MISTAKES = (*BUGS, *INEFFICIENT, *TRANSPORT_BUGS)
+
+
+def test_every_mistake_of_the_zoo_has_a_small_picture_on_the_page_of_symptoms() -> None:
+    page = symptoms.page()
+    assert {path.stem for path in (ROOT / "docs" / "symptoms").glob("*.png")} == {*map(symptoms.slug, MISTAKES)}
+    for name in MISTAKES:
+        assert (ROOT / "docs" / symptoms.file(name)).stat().st_size < 60_000
+        assert f"]({symptoms.file(name)})" in page
+
+
+def few(monkeypatch) -> None:
+    for name, value in {"SIDE": 12, "REPLICAS": 4, "BATCHES": 1}.items():
+        monkeypatch.setattr(planted, name, value)
+
+
+def test_a_mistake_planted_in_flatland_is_the_zoo_s_own(monkeypatch) -> None:
+    """Dividing by M once more halves every pixel."""
+    few(monkeypatch)
+    right, wrong = planted.both(BUGS["divided by M twice"])
+    assert right.sum() > 0
+    assert wrong == pytest.approx(right / 2)
+
+
+def test_a_mistake_in_a_shift_is_planted_above_the_shift_of_paths(monkeypatch) -> None:
+    few(monkeypatch)
+    wrong = planted.film().made_of(BUGS["Jacobian left out"].wrong.here).now
+    here, near = Pixels(wrong, np.arange(144)), Pixels(wrong, np.roll(np.arange(144), 1))
+    X = initial(near, Live(np.random.default_rng(1)))
+    J = wrong.of.shift(X.x, near.index, Pixels(wrong.of, here.index)).J
+    assert set(wrong.shift(X.x, near.index, here).J) == {0.0, 1.0}
+    assert len(set(J)) > 2
+
+
+def test_a_mistake_that_is_made_of_cells_has_the_exact_picture_of_its_scene(monkeypatch) -> None:
+    few(monkeypatch)
+    assert planted.picture_of("two-to-one shift")[1] == "exact"
+    assert planted.picture_of("1/M over unequal supports")[1] == "planted"
 
 
 # ---------------------------------------------------------------- what is checked of a site
