@@ -8,9 +8,9 @@ from docs.site import layout, words
 HERE, FOLDER = "symptoms.html", "symptoms"
 PLANTED = re.compile(r"^\| (?P<symptom>[^|]+) \| \*\*(?P<name>[^|*]+)\*\* \|", re.MULTILINE)
 SAID = (
-    "The pictures: fluence of a room in flatland, 240 images averaged, rendered by the loop of the zoo with the mistake "
-    "in it and without. Where a mistake is made of a table of cells, the picture is the exact bias of each cell of its own "
-    "small scene. They are drawn by `python -m docs.site.planted`."
+    "The pictures: fluence of a room in flatland, 240 images averaged, rendered by the loop of the zoo with the "
+    "mistake in it and without. Where a mistake is made of a table of cells, the picture is the exact bias of each "
+    "cell of its own small scene. They are drawn by `python -m docs.site.planted`."
 )
 
 
