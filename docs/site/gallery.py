@@ -67,9 +67,10 @@ def picture(id_: str) -> tuple[Path, str] | None:
         found = layout.ROOT / folder / id_ / "figure.png"
         if found.exists():
             return found, _preset(found.parent)
-    kept_ones = (COMMITTED / f"{id_}.png", layout.ROOT / "docs" / f"{id_.lower()}.png")
-    found = next((each for each in kept_ones if each.exists()), None)
-    return (found, "paper" if id_ in _of_paper_runs() else "quick") if found else None
+    for kept_one in (COMMITTED / f"{id_}.png", layout.ROOT / "docs" / f"{id_.lower()}.png"):
+        if kept_one.exists():
+            return kept_one, "paper" if id_ in _of_paper_runs() else "quick"
+    return None
 
 
 def _preset(folder: Path) -> str:
