@@ -26,7 +26,7 @@ HYPOTHESIS_PROFILE ?= ci
 export HYPOTHESIS_PROFILE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup figures figures-paper test test-lowest dist lint audit check notebooks notebook-pages evidence bench clean
+.PHONY: help setup figures figures-paper test test-lowest dist lint audit check notebooks notebook-pages docs evidence bench clean
 
 help:  ## list the targets
 	@echo 'usage: make TARGET [ARGS="..."] [JOBS=2] [OUT=out] [PYTHON=python3]'
@@ -71,6 +71,9 @@ notebooks: $(STAMP)-notebooks  ## open the notebooks in Jupyter; ARGS="--no-brow
 notebook-pages: $(STAMP)  ## run the notebooks and write them into docs/notebooks; ARGS="01 ..." does some
 	$(PY) -m notebooks.pages $(ARGS)
 
+docs: $(STAMP)-docs  ## the documentation site, into out-docs/html, to read without a network
+	$(PY) -m docs.site --out out-docs $(ARGS)
+
 evidence: $(STAMP)  ## the long runs whose results are committed; hours
 	@if [ -f benchmarks/evidence.py ]; then $(PY) benchmarks/evidence.py $(ARGS); \
 	else echo 'No evidence jobs yet: benchmarks/evidence.py will hold them.'; fi
@@ -80,8 +83,8 @@ bench: $(STAMP)  ## time the hot paths; every script prints ratios
 	    if [ ! -e "$$script" ]; then echo 'No benchmarks yet: benchmarks/bench_*.py will hold them.'; break; fi; \
 	    echo "== $$script"; $(PY) "$$script" $(ARGS); done
 
-clean:  ## remove caches, build products and out/; keep .venv and out-paper/
-	rm -rf out build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
+clean:  ## remove caches, build products, out/ and out-docs/; keep .venv and out-paper/
+	rm -rf out out-docs build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find . -path ./$(VENV) -prune -o -type d -name __pycache__ -exec rm -rf {} +
 
 # ---------------------------------------------------------------- set-up
@@ -130,4 +133,9 @@ $(VENV)-lowest/.installed: pyproject.toml
 $(STAMP)-notebooks: $(STAMP)
 	@echo 'Installing Jupyter into $(VENV).'
 	@$(PY) -m pip install -qq -c constraints.txt -e '.[notebooks]'
+	@touch $@
+
+$(STAMP)-docs: $(STAMP)
+	@echo 'Installing Sphinx into $(VENV).'
+	@$(PY) -m pip install -qq -c constraints.txt -e . --group docs
 	@touch $@

@@ -30,6 +30,12 @@ class Setting:
 
     Raises ValueError for a depth that is no whole number >= 1, and for an eye or a map in a solid or out of
     doors; so does `dataclasses.replace`, the way to move an eye.
+
+    >>> from dataclasses import replace
+    >>> from flatland2d import setting
+    >>> room = setting("ajar")
+    >>> replace(room, eye=(0.4, 0.4)).pinhole(64).n, room.fluence(30, 20).shape
+    (64, (20, 30))
     """
 
     scene: Scene
@@ -235,7 +241,16 @@ SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
 
 
 def setting(name: str) -> Setting:
-    """The scene of that name.  Raises ValueError for an unknown one, with the nearest."""
+    """The scene of that name.  Raises ValueError for an unknown one, with the nearest.
+
+    >>> from flatland2d import setting
+    >>> setting("cornell").depth
+    3
+    >>> setting("cornel")
+    Traceback (most recent call last):
+    ...
+    ValueError: there is no scene 'cornel': did you mean 'cornell'?
+    """
     if name not in SCENES:
         near = get_close_matches(name, SCENES, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(SCENES)}."

@@ -23,6 +23,16 @@ class Pinhole:
     eye and towards are points; `half` is the tangent of half the field of view.
     Raises ValueError for points without 2 coordinates, a crop that is empty, not on the film or not of
     whole pixels, no direction, or no field of view.
+
+    >>> import numpy as np
+    >>> from flatland2d import Pinhole
+    >>> eye = Pinhole(eye=(0.0, 0.0), towards=(1.0, 0.0), n=3, half=1.0, film=3)
+    >>> x, w, weight = eye.ray(np.arange(3), np.full((1, 3), 0.5))
+    >>> w.round(2)
+    array([[ 0.83,  1.  ,  0.83],
+           [ 0.55,  0.  , -0.55]])
+    >>> eye.project(x + w).round(2)
+    array([0.5, 1.5, 2.5])
     """
 
     eye: tuple[float, float]
@@ -83,6 +93,13 @@ class FluenceMap:
     """columns x rows pixels over the rectangle low .. high; each integrates radiance from all directions.
 
     Raises ValueError for no whole pixels, points without 2 coordinates, or an empty rectangle.
+
+    >>> import numpy as np
+    >>> from flatland2d import FluenceMap
+    >>> places = FluenceMap(low=(0.0, 0.0), high=(2.0, 1.0), columns=4, rows=2)
+    >>> x, _, weight = places.ray(np.arange(places.n), np.full((3, places.n), 0.5))
+    >>> x[:, 5], weight[5].round(3)
+    (array([0.75, 0.75]), np.float64(6.283))
     """
 
     low: tuple[float, float]
@@ -144,7 +161,11 @@ def facing(scene: Scene, sensor: Sensor, at: float = 0.5) -> Array:
 
 
 def check_view(scene: Scene, sensor: Sensor) -> None:
-    """Raise ValueError if no pixel sees the front of a surface: the sensor is inside a solid, or out of doors."""
+    """Raise ValueError if no pixel sees the front of a surface: the sensor is inside a solid, or out of doors.
+
+    >>> from flatland2d import Pinhole, check_view, setting
+    >>> check_view(setting("cornell").scene, Pinhole((0.5, 0.5), (1.0, 0.5), 8))
+    """
     directions = (np.arange(8) + 0.5) / 8
     if not any((facing(scene, sensor, at) > 0).any() for at in directions):
         raise ValueError(

@@ -87,6 +87,13 @@ def take(batch: Batch, index: Array) -> Batch:
 
     `ndarray.take` keeps C order; `leaf[:, index]` would return Fortran order and silently turn
     the struct of arrays into an array of structs, which slows down everything after it.
+
+    >>> import numpy as np
+    >>> from restir_ref import Reservoirs
+    >>> from restir_ref.batch import take
+    >>> X = Reservoirs(np.array([0.1, 0.2, 0.3]), W=np.ones(3), c=np.ones(3))
+    >>> take(X, np.array([2, 0])).x
+    array([0.3, 0.1])
     """
     columns(index)
 
@@ -186,7 +193,15 @@ def joined(batches: Sequence[Batch]) -> Batch:
 
 
 def where(mask: Array, a: Batch, b: Batch) -> Batch:
-    """Column n of `a` where mask[n], else of `b`; mask (N,)."""
+    """Column n of `a` where mask[n], else of `b`; mask (N,).
+
+    >>> import numpy as np
+    >>> from restir_ref import Shifted
+    >>> from restir_ref.batch import where
+    >>> a, b = Shifted(np.zeros(2), np.ones(2)), Shifted(np.ones(2), np.zeros(2))
+    >>> where(np.array([True, False]), a, b)
+    Shifted(x=array([0., 1.]), J=array([1., 0.]))
+    """
     merged: Batch = map_leaves(lambda x, y: np.where(mask, x, y), a, b)
     return merged
 
@@ -233,7 +248,13 @@ def entry(stack: Array, i: Array) -> Array:
 
 
 def ratio(a: Array, b: Array) -> Array:
-    """a / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples."""
+    """a / b with x / 0 = 0, the convention 0/0 = 0 of MIS weights and null samples.
+
+    >>> import numpy as np
+    >>> from restir_ref.batch import ratio
+    >>> ratio(np.array([1.0, 0.0]), np.array([4.0, 0.0]))
+    array([0.25, 0.  ])
+    """
     null = np.equal(b, 0)
     if not null.any():
         return np.asarray(a / b)

@@ -17,7 +17,15 @@ from restir_ref.batch import Array
 
 
 class Chance(Protocol):
-    """Where random decisions come from; the batch axis is last."""
+    """Where random decisions come from; the batch axis is last.
+
+    >>> import numpy as np
+    >>> from restir_ref import Chance, Live
+    >>> def coin(chance: Chance, n: int):
+    ...     return chance.choose(np.ones((2, n)))
+    >>> coin(Live(np.random.default_rng(1)), 5)
+    array([1, 1, 0, 1, 0])
+    """
 
     def choose(self, weights: Array) -> Array:
         """Index (N,) with P(k) = weights[k] / sum(weights), weights (K, N) >= 0; 0 where all are 0."""
@@ -28,7 +36,16 @@ class Chance(Protocol):
 
 @dataclass(frozen=True)
 class Live:
-    """Chance from a NumPy generator: `Live(numpy.random.default_rng(seed))`."""
+    """Chance from a NumPy generator: `Live(numpy.random.default_rng(seed))`.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live
+    >>> chance = Live(np.random.default_rng(1))
+    >>> chance.choose(np.array([[1.0, 0.0, 3.0], [1.0, 2.0, 0.0]]))  # three columns, two options
+    array([1, 1, 0])
+    >>> chance.uniform((2,)).round(3)
+    array([0.949, 0.312])
+    """
 
     rng: "np.random.Generator | Columns"
 

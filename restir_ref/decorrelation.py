@@ -55,7 +55,18 @@ def metropolis(move: Move) -> Array:
 
 
 def mutate(X: Reservoirs, here: Pixels, chance: Chance, acceptance: Acceptance = metropolis) -> Reservoirs:
-    """One Metropolis-Hastings step that leaves p_hat invariant; k steps are k calls.  [MCMC 3.2]"""
+    """One Metropolis-Hastings step that leaves p_hat invariant; k steps are k calls.  [MCMC 3.2]
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial, shade
+    >>> from restir_ref.decorrelation import mutate
+    >>> from toy1d import two_pixels, walking
+    >>> here, chance = Pixels(walking(two_pixels()), np.arange(20_000)), Live(np.random.default_rng(1))
+    >>> X = initial(here, chance, M=4)
+    >>> Y = mutate(X, here, chance)
+    >>> bool(np.allclose(shade(X, here), shade(Y, here))), float((X.x != Y.x).mean().round(2))
+    (True, 0.96)
+    """
     return attempt(X, here, chance, acceptance)[0]
 
 
@@ -105,6 +116,16 @@ def mutations(k: int, rule: Rule = by_target) -> Mutation:
     """The decorrelation pass: k mutations of every reservoir, one after the other.  [MCMC 3.2.4, Alg. 3]
 
     Raises ValueError for k that is no whole number >= 0, and the pass TypeError for integrals that cannot propose.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial
+    >>> from restir_ref.decorrelation import mutations
+    >>> from toy1d import two_pixels, walking
+    >>> here, chance = Pixels(walking(two_pixels()), np.arange(1000)), Live(np.random.default_rng(1))
+    >>> X = initial(here, chance)
+    >>> Y = mutations(5)(X, here, chance)
+    >>> float((X.x != Y.x).mean().round(2))
+    1.0
     """
     whole(k, 0, "the number k of mutations", "It counts proposals per pixel and frame; 0 leaves the pass out.")
 

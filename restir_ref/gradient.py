@@ -43,7 +43,18 @@ def omega(x: Sample, base: Pixels, y: Shifted, offset: Pixels, proxy: Proxy = ta
 
 
 def gap(x: Sample, base: Pixels, y: Shifted, offset: Pixels) -> Array:
-    """f_i(x) - f_j(T_ij x) J, y = T_ij x; (C, N).  [GPT Eq. 2, 15]"""
+    """f_i(x) - f_j(T_ij x) J, y = T_ij x; (C, N).  [GPT Eq. 2, 15]
+
+    >>> import numpy as np
+    >>> from restir_ref import Pixels
+    >>> from restir_ref.gradient import gap
+    >>> from restir_ref.integrals import shifted
+    >>> from toy1d import two_pixels
+    >>> line, x = two_pixels(), np.array([0.25, 0.6])
+    >>> here, other = Pixels(line, np.array([0, 0])), Pixels(line, np.array([1, 1]))
+    >>> gap(x, here, shifted(x, here, other), other).round(2)
+    array([[ 1.69, -2.73]])
+    """
     return np.asarray(base.of.contribution(base.index, read_only(x)) - weighted(offset, y.x, y.J))
 
 
@@ -125,6 +136,15 @@ class Pairs:
     are signed: an estimate adds up the shading of both signs, or is that of `MAGNITUDE` alone.
     The weight w* compares targets [GPT Eq. 13]; proxy=pdf compares sampling densities instead
     [GPT Eq. 4, as Eq. 16 has it], for candidates fresh from the samplers.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial, shade
+    >>> from restir_ref.gradient import SIGNS, Pairs
+    >>> from toy1d import shared_peak
+    >>> chance, index, ends = Live(np.random.default_rng(1)), np.arange(20_000), np.array([[0], [1]])  # one pair
+    >>> parts = [Pixels(Pairs(shared_peak(), ends, part), index) for part in SIGNS.values()]
+    >>> [shade(initial(here, chance, M=8), here).mean().round(2) for here in parts]  # their sum is I_0 - I_1
+    [np.float64(0.16), np.float64(-0.1)]
     """
 
     of: Integrals

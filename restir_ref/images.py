@@ -27,6 +27,14 @@ def random_in_disk(shape: Shape) -> Around:
 
     Near a border a mirrored one can be the pixel itself, which is unbiased, only no news.
     The choice raises ValueError for a radius below 1, and for images that are not whole crops of that shape.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live
+    >>> from restir_ref.images import random_in_disk
+    >>> from toy1d import image_of_64
+    >>> near = random_in_disk((8, 8))(image_of_64(), np.array([0, 27]), 2, 1.5, Live(np.random.default_rng(1)))
+    >>> [each.index for each in near]
+    [array([ 9, 36]), array([ 8, 36])]
     """
 
     def around(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
@@ -73,6 +81,10 @@ def tiles(shape: Shape, side: int = 4) -> Array:
 
     Path reuse for pixels in this order reuses by these tiles; image[:, tiles] = estimates puts them back.
     Raises ValueError unless tiles fill the image.
+
+    >>> from restir_ref.images import tiles
+    >>> tiles((2, 4), side=2)
+    array([0, 1, 4, 5, 2, 3, 6, 7])
     """
     rows, columns = shape
     if side < 1 or rows % side or columns % side:
@@ -85,6 +97,11 @@ def disk(radius: float) -> Array:
     """Steps (2, K) to all pixels within the radius but the pixel itself, rows first, the nearest ones first.
 
     Raises ValueError for a radius below 1.
+
+    >>> from restir_ref.images import disk
+    >>> disk(1)
+    array([[ 0, -1,  1,  0],
+           [-1,  0,  0,  1]])
     """
     if not 1 <= radius < np.inf:
         raise ValueError(

@@ -30,6 +30,22 @@ class Integrals(Protocol):
     Methods are functions of their arguments: they write into none of them (samples come read-only), and
     return arrays that nobody writes into afterwards, new ones or parts of the samples; never a buffer
     that the next call fills again.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, Shifted, initial, shade
+    >>> class Ramps:  # f_i(x) = (i + 1) x on [0, 1)
+    ...     def candidates(self, index, chance):
+    ...         yield chance.uniform((len(index),)), np.ones(len(index))
+    ...     def target(self, index, x):
+    ...         return (index + 1) * x
+    ...     def contribution(self, index, x):
+    ...         return self.target(index, x)[None]
+    ...     def shift(self, x, index, to):
+    ...         return Shifted(x, np.ones(len(index)))
+    >>> here = Pixels(Ramps(), np.array([0, 1]).repeat(10_000))
+    >>> Y = initial(here, Live(np.random.default_rng(1)), M=4)
+    >>> shade(Y, here).reshape(2, -1).mean(axis=1).round(2)
+    array([0.5, 1. ])
     """
 
     def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Sample, Array]]:
@@ -69,6 +85,14 @@ class Pixels:
 
     As a source of reuse, `index` is `NOWHERE` where there is none: the column enters with W = 0 and c = 0.
     Raises TypeError for an index that is no array (N,) of integers, IndexError for one below `NOWHERE`.
+
+    >>> import numpy as np
+    >>> from restir_ref import Pixels
+    >>> from toy1d import two_pixels
+    >>> line = two_pixels()
+    >>> here = Pixels(line, np.arange(6))  # three replicas of both pixels
+    >>> here.of.n, here.index % here.of.n
+    (2, array([0, 1, 0, 1, 0, 1]))
     """
 
     of: Integrals
@@ -80,7 +104,16 @@ class Pixels:
 
 @dataclass(frozen=True)
 class Shifted:
-    """y = T(x) and J = |dT/dx| (N,); J = 0 where x is outside the domain of T (y is then any valid sample)."""
+    """y = T(x) and J = |dT/dx| (N,); J = 0 where x is outside the domain of T (y is then any valid sample).
+
+    >>> import numpy as np
+    >>> from restir_ref import Pixels
+    >>> from toy1d import overlapping_supports
+    >>> line = overlapping_supports()
+    >>> y = line.shift(np.array([0.25, 0.5]), np.array([3, 3]), Pixels(line, np.array([4, 4])))
+    >>> y.x.round(2), y.J  # the first one has no counterpart in the next pixel
+    (array([0.58, 0.5 ]), array([0., 1.]))
+    """
 
     x: Sample
     J: Array
@@ -91,6 +124,13 @@ class Reservoirs:
     """Samples x with unbiased contribution weights W (N,) and confidence weights c (N,).  [GRIS 6.2]
 
     Null samples have W = 0 and keep their confidence: confidence never depends on sample values.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial
+    >>> from toy1d import two_pixels
+    >>> X = initial(Pixels(two_pixels(), np.arange(2)), Live(np.random.default_rng(1)), M=8)
+    >>> X.x.round(3), X.W.round(3), X.c
+    (array([0.144, 0.538]), array([0.669, 0.333]), array([1, 1]))
     """
 
     x: Sample
@@ -99,7 +139,15 @@ class Reservoirs:
 
 
 def target(at: Pixels, x: Sample) -> Array:
-    """p_hat(x) of the integrals `at`, checked: (N,), finite and >= 0."""
+    """p_hat(x) of the integrals `at`, checked: (N,), finite and >= 0.
+
+    >>> import numpy as np
+    >>> from restir_ref import Pixels
+    >>> from restir_ref.integrals import target
+    >>> from toy1d import two_pixels
+    >>> target(Pixels(two_pixels(), np.array([1, 1])), np.array([0.6, 2.0])).round(2)  # 2.0 is outside of the domain
+    array([3.2, 0. ])
+    """
     p_hat = per_column(wide(np.asarray(at.of.target(at.index, read_only(x)))), len(at.index), "the target p_hat")
     return nonnegative(p_hat, "the target p_hat", "Return |f|, or another finite non-negative proxy, from target().")
 
@@ -179,6 +227,16 @@ def p_hat_from(j: Pixels, y: Sample, here: Pixels, proxy: Proxy = target) -> Arr
     """p_hat_from_j(y) = p_hat_j(T_j^-1(y)) |dT_j^-1/dy|, 0 where undefined; (N,).  [GRIS Eq. 35]
 
     The factor "y in T_j(supp X_j)" is in p_hat_j, whose support lies inside supp X_j.
+
+    >>> import numpy as np
+    >>> from restir_ref import Pixels
+    >>> from restir_ref.integrals import p_hat_from
+    >>> from toy1d import overlapping_supports
+    >>> line = overlapping_supports()
+    >>> here, near = (Pixels(line, np.full(3, pixel)) for pixel in (3, 4))
+    >>> y = np.array([0.25, 0.5, 0.75])
+    >>> p_hat_from(near, y, here).round(3), line.target(here.index, y).round(3)
+    (array([0.   , 0.901, 0.467]), array([0.214, 1.1  , 0.214]))
     """
     back = shifted(y, here, j)
     return back.J * proxy(j, back.x)

@@ -17,7 +17,13 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 
 @dataclass(frozen=True)
 class Preset:
-    """Parameters of a loop; `along` and `across` name the MIS weights of temporal and spatial reuse."""
+    """Parameters of a loop; `along` and `across` name the MIS weights of temporal and spatial reuse.
+
+    >>> from dataclasses import replace
+    >>> from restir_ref.loop import REAL_TIME
+    >>> replace(REAL_TIME, cap=50, neighbours=5)
+    Preset(trees=1, rounds=1, neighbours=5, radius=20, cap=50, along='talbot', across='defensive')
+    """
 
     trees: int
     rounds: int
@@ -74,6 +80,19 @@ def frame(
 
     history are the previous frame's reservoirs, `before` the columns of it that motion vectors
     name, in the previous frame's integrals.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, shade
+    >>> from restir_ref.loop import REAL_TIME, frame, random_in_row
+    >>> from toy1d import image_of_64
+    >>> row, chance = image_of_64(), Live(np.random.default_rng(1))
+    >>> here = Pixels(row, np.arange(50 * row.n))  # 50 replicas
+    >>> Y = frame(here, chance, REAL_TIME, random_in_row)
+    >>> one = shade(Y, here).std()
+    >>> for _ in range(4):
+    ...     Y = frame(here, chance, REAL_TIME, random_in_row, Y, [here])
+    >>> bool(shade(Y, here).std() < one)
+    True
     """
     X = passes.initial(here, chance, preset.trees)
     if history is not None:
@@ -92,12 +111,29 @@ def random_in_row(of: Image, index: Array, count: int, radius: float, chance: Ch
 
     Within radius / 2 of an end a mirrored one can be the pixel itself, which is unbiased, only no news.
     Rows shorter than the radius are mirrored at both ends in turn.  Raises ValueError for a radius below 1.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live
+    >>> from restir_ref.loop import random_in_row
+    >>> from toy1d import image_of_64
+    >>> near = random_in_row(image_of_64(), np.array([0, 32, 63]), 2, 3, Live(np.random.default_rng(1)))
+    >>> [each.index for each in near]
+    [array([ 1, 35, 60]), array([ 3, 30, 62])]
     """
     return [_moved(of, index, u, radius) for u in chance.uniform((count, len(index)))]
 
 
 def spread_in_row(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
-    """The same from the golden-ratio sequence with a random start per column: evenly spread."""
+    """The same from the golden-ratio sequence with a random start per column: evenly spread.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live
+    >>> from restir_ref.loop import spread_in_row
+    >>> from toy1d import image_of_64
+    >>> near = spread_in_row(image_of_64(), np.array([32]), 4, 10, Live(np.random.default_rng(1)))
+    >>> [int(each.index[0]) for each in near]
+    [33, 24, 37, 29]
+    """
     start = chance.uniform((len(index),))
     return [_moved(of, index, (start + k * GOLDEN) % 1, radius) for k in range(count)]
 

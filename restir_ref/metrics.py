@@ -24,7 +24,14 @@ REPLICAS = 64
 
 
 def mape(image: Array, reference: Array, axes: Axes = ROW) -> Array:
-    """mean |I - R| / (.01 mean R + R): free of the images' scale; (..., pixels) -> (...).  [GRIS 9.3, footnote 13]"""
+    """mean |I - R| / (.01 mean R + R): free of the images' scale; (..., pixels) -> (...).  [GRIS 9.3, footnote 13]
+
+    >>> import numpy as np
+    >>> from restir_ref.metrics import mape
+    >>> reference = np.array([1.0, 2.0, 3.0])
+    >>> mape(1.1 * reference, reference).round(3)  # a little below .1: the floor
+    np.float64(0.099)
+    """
     return np.asarray((abs(image - reference) / (SMALL * _mean(reference, axes) + reference)).mean(axis=axes))
 
 
@@ -34,13 +41,26 @@ def mape_with_floor(image: Array, reference: Array, axes: Axes = ROW) -> Array:
 
 
 def rel_mse(image: Array, reference: Array, axes: Axes = ROW) -> Array:
-    """mean (I - R)^2 / (R^2 + (.01 mean R)^2); (..., pixels) -> (...)."""
+    """mean (I - R)^2 / (R^2 + (.01 mean R)^2); (..., pixels) -> (...).
+
+    >>> import numpy as np
+    >>> from restir_ref.metrics import rel_mse
+    >>> reference = np.array([1.0, 2.0, 3.0])
+    >>> rel_mse(1.1 * reference, reference).round(4)
+    np.float64(0.01)
+    """
     scale2 = reference**2 + (SMALL * _mean(reference, axes)) ** 2
     return np.asarray(((image - reference) ** 2 / scale2).mean(axis=axes))
 
 
 def rmse(image: Array, reference: Array, axes: Axes = ROW) -> Array:
-    """sqrt(mean (I - R)^2); (..., pixels) -> (...)."""
+    """sqrt(mean (I - R)^2); (..., pixels) -> (...).
+
+    >>> import numpy as np
+    >>> from restir_ref.metrics import rmse
+    >>> rmse(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 6.0])).round(3)
+    np.float64(1.732)
+    """
     return np.asarray(np.sqrt(((image - reference) ** 2).mean(axis=axes)))
 
 
@@ -71,6 +91,12 @@ def bias_and_variance(images: Array, reference: Array) -> Split:
 
     s^2 / K is the squared standard error of the mean, which the square of a measured bias contains;
     without a bias, bias2 is as often negative.  Raises ValueError for fewer than 64 images.
+
+    >>> import numpy as np
+    >>> from restir_ref.metrics import bias_and_variance
+    >>> images = 2.1 + np.random.default_rng(1).normal(0, 0.5, (1000, 8))
+    >>> bias_and_variance(images, np.full(8, 2.0)).variance.round(1)
+    array([0.2, 0.3, 0.2, 0.3, 0.2, 0.2, 0.3, 0.2])
     """
     K = images.shape[-2]
     if K < REPLICAS:
@@ -87,6 +113,12 @@ def box_covariance(images: Array, reference: Array, radius: int = 8, axes: Axes 
 
     c_ij = sum_m (I_mi - mean I_i)(I_mj - mean I_j) / (K - 1); boxes end where the image ends.
     Raises ValueError for a single image.
+
+    >>> import numpy as np
+    >>> from restir_ref.metrics import box_covariance
+    >>> images = 1 + np.repeat(np.random.default_rng(1).normal(0, 0.1, (1000, 32)), 2, axis=-1)  # pixels err in pairs
+    >>> box_covariance(images, np.ones(64), radius=1).mean().round(4)
+    np.float64(0.005)
     """
     # erratum: [MCMC 6.2] calls it relative, but prints no division, and does not say that j = i is left out,
     # without which it holds the variance.
@@ -116,6 +148,12 @@ def power_spectrum(errors: Array, axes: Axes = ROW) -> Array:
     """S(k) = |sum_x e(x) exp(-2 pi i k.x)|^2 / n, in the order of `numpy.fft`.
 
     Its mean is that of e^2, and white noise is flat.
+
+    >>> import numpy as np
+    >>> from restir_ref.metrics import power_spectrum
+    >>> noise = np.random.default_rng(1).normal(0, 2, (500, 64))
+    >>> power_spectrum(noise).mean().round(1)
+    np.float64(3.9)
     """
     n = prod(errors.shape[axis] for axis in axes)
     return np.asarray(abs(np.fft.fftn(errors, axes=axes)) ** 2 / n)

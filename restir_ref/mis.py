@@ -29,6 +29,12 @@ class Confidences:
     """Confidences c[j] of all inputs, each (N,), and which of the inputs are canonical.
 
     Engines count in bytes, whose sums and products wrap: what is read from here is a float, or exact.
+
+    >>> import numpy as np
+    >>> from restir_ref.mis import Confidences
+    >>> c = Confidences([np.array([1]), np.array([20]), np.array([4])], canonical=[0])
+    >>> len(c), c.C, c.C_R, c.C_N
+    (3, array([25.]), array([1.]), array([24.]))
     """
 
     c: Sequence[Array]
@@ -69,18 +75,40 @@ Mis = Callable[[int, Density, Confidences], Array]
 
 
 def constant(i: int, q: Density, c: Confidences) -> Array:
-    """m_i = c_i / C: 1/M without confidences.  Right only where every input can realise every y."""
+    """m_i = c_i / C: 1/M without confidences.  Right only where every input can realise every y.
+
+    >>> import numpy as np
+    >>> from restir_ref.mis import Confidences, constant
+    >>> constant(1, lambda j: np.ones(1), Confidences([np.array([1]), np.array([3])], canonical=[0]))
+    array([0.75])
+    """
     return ratio(c[i], c.C)
 
 
 def one_over_z(i: int, q: Density, c: Confidences) -> Array:
-    """1{q_i > 0} c_i / Z, Z = sum_j c_j 1{q_j > 0}: the contribution weight of [Bitterli 2020].  [GRIS Eq. 17]"""
+    """1{q_i > 0} c_i / Z, Z = sum_j c_j 1{q_j > 0}: the contribution weight of [Bitterli 2020].  [GRIS Eq. 17]
+
+    >>> import numpy as np
+    >>> from restir_ref.mis import Confidences, one_over_z
+    >>> q = [np.array([0.5, 0.5]), np.array([2.0, 0.0])]
+    >>> c = Confidences([np.ones(2), np.ones(2)], canonical=[0])
+    >>> one_over_z(0, lambda j: q[j], c)  # the second input cannot make the second sample
+    array([0.5, 1. ])
+    """
     realises = [c[j] * (q(j) > 0) for j in range(len(c))]
     return ratio(realises[i], total(realises))
 
 
 def talbot(i: int, q: Density, c: Confidences) -> Array:
-    """m_i = c_i q_i / sum_j c_j q_j, the balance heuristic over proxy densities.  [GRIS Eq. 36]"""
+    """m_i = c_i q_i / sum_j c_j q_j, the balance heuristic over proxy densities.  [GRIS Eq. 36]
+
+    >>> import numpy as np
+    >>> from restir_ref.mis import Confidences, talbot
+    >>> q = [np.array([0.5, 0.5]), np.array([1.5, 0.0])]
+    >>> c = Confidences([np.ones(2), np.ones(2)], canonical=[0])
+    >>> [talbot(i, lambda j: q[j], c) for i in (0, 1)]
+    [array([0.25, 1.  ]), array([0.75, 0.  ])]
+    """
     shares = [c[j] * q(j) for j in range(len(c))]
     return ratio(shares[i], total(shares))
 
@@ -90,6 +118,13 @@ def pairwise(i: int, q: Density, c: Confidences) -> Array:
 
     others:     m_i = c_i q_i / D_i
     canonical:  m_i = (c_i / C_N) sum_j c_j p_hat / D_j,  and c_i / C where there are no others.
+
+    >>> import numpy as np
+    >>> from restir_ref.mis import Confidences, pairwise
+    >>> q = [np.array([1.0]), np.array([1.0]), np.array([0.0])]
+    >>> c = Confidences([np.ones(1)] * 3, canonical=[0])
+    >>> [pairwise(i, lambda j: q[j], c).round(3) for i in range(3)]
+    [array([0.667]), array([0.333]), array([0.])]
     """
     if i not in c.canonical:
         return ratio(c[i] * q(i), _pair(i, q, c))
@@ -103,6 +138,13 @@ def defensive(i: int, q: Density, c: Confidences) -> Array:
 
     others:     m_i = (C_N / C) c_i q_i / D_i
     canonical:  m_i = (c_i / C) (1 + sum_j c_j p_hat / D_j)
+
+    >>> import numpy as np
+    >>> from restir_ref.mis import Confidences, defensive
+    >>> q = [np.array([1.0]), np.array([1e9]), np.array([1e9])]
+    >>> c = Confidences([np.ones(1)] * 3, canonical=[0])
+    >>> defensive(0, lambda j: q[j], c).round(3)  # never below c_0 / C
+    array([0.333])
     """
     if i not in c.canonical:
         return ratio(c.C_N * c[i] * q(i), c.C * _pair(i, q, c))
@@ -135,6 +177,15 @@ class Weights:
     what only a sample of confidence 0 could realise is lost, as if its input were not there.
     `proxy` is the density that q compares: p_hat, or `pdf` where all inputs have known densities
     [GRIS 5.6, tractable PDFs].
+
+    >>> from restir_ref import WEIGHTS
+    >>> for name, weights in WEIGHTS.items():
+    ...     print(f"{name:<9} for {weights.unbiased_for}")
+    talbot    for inputs that cover supp p_hat, those of confidence 0 not counted
+    pairwise  for inputs with a canonical one that covers supp p_hat
+    defensive for inputs with a canonical one that covers supp p_hat
+    1/Z       for inputs that cover supp p_hat, those of confidence 0 not counted
+    constant  for inputs that can all realise the same samples
     """
 
     m: Mis

@@ -40,7 +40,15 @@ Solver = Callable[[Array], Array]
 
 
 def differences(image: Array, dimensions: int = 2) -> list[Array]:
-    """grad I = (dx, dy), or (dx,) of a row: forward differences, one pixel fewer along their axis each."""
+    """grad I = (dx, dy), or (dx,) of a row: forward differences, one pixel fewer along their axis each.
+
+    >>> import numpy as np
+    >>> from restir_ref.poisson import differences
+    >>> dx, dy = differences(np.array([[1.0, 2.0, 4.0], [1.0, 1.0, 1.0]]))
+    >>> dx, dy
+    (array([[1., 2.],
+           [0., 0.]]), array([[ 0., -1., -3.]]))
+    """
     return [np.diff(image, axis=-1 - k) for k in range(dimensions)]
 
 
@@ -124,6 +132,14 @@ def l2(
 
     l2(row, dx), l2(image, dx, dy); (..., *shape) -> (..., *shape).  Linear, so unbiased if its inputs are.  [GPT 2.1]
     Raises ValueError as `checked` does.
+
+    >>> import numpy as np
+    >>> from restir_ref.poisson import differences, l2
+    >>> rng, truth = np.random.default_rng(1), np.tile(np.linspace(0, 1, 32), (32, 1))
+    >>> primal = truth + rng.normal(0, 0.1, truth.shape)
+    >>> measured = [d + rng.normal(0, 0.01, d.shape) for d in differences(truth)]
+    >>> abs(primal - truth).mean().round(3), abs(l2(primal, *measured) - truth).mean().round(3)
+    (np.float64(0.079), np.float64(0.009))
     """
     I, G = checked(primal, gradients, alpha)
     return solver(I.shape[-len(G) :], alpha)(right_side(I, *G, alpha=alpha))
@@ -133,7 +149,12 @@ def l2(
 
 
 def symbol(shape: tuple[int, ...]) -> Array:
-    """D(k) = sum over axes of 2 - 2 cos(pi k / n), the eigenvalues of grad^T grad; of this shape."""
+    """D(k) = sum over axes of 2 - 2 cos(pi k / n), the eigenvalues of grad^T grad; of this shape.
+
+    >>> from restir_ref.poisson import symbol
+    >>> symbol((4,)).round(3)
+    array([0.   , 0.586, 2.   , 3.414])
+    """
     along = [2 - 2 * np.cos(tau * np.arange(n) / (2 * n)) for n in shape]
     return total([*np.meshgrid(*along, indexing="ij", sparse=True)])
 

@@ -43,6 +43,15 @@ def l1(
     would freeze the first guess.  Solved for is the step from the L2 image, whose size does not depend on the image's.
     l1(..., progress=tqdm) shows a bar.
     Raises ValueError as `poisson.checked` does, and for fewer than 1 round.
+
+    >>> import numpy as np
+    >>> from restir_ref.poisson import differences, l2
+    >>> from restir_ref.poisson_l1 import l1
+    >>> truth = np.zeros((16, 16))
+    >>> dx, dy = differences(truth)
+    >>> dx[8, 8] = 1.0  # an outlier
+    >>> abs(l2(truth, dx, dy)).max().round(3), abs(l1(truth, dx, dy)).max().round(3)
+    (np.float64(0.246), np.float64(0.0))
     """
     whole(rounds, 1, "the number of rounds", f"The customary number is {ROUNDS}.")
     I_prim, G = checked(primal, gradients, alpha)

@@ -29,7 +29,15 @@ ONE = np.array(1)
 
 @dataclass(frozen=True, eq=False)
 class Input:
-    """One input of a pass: reservoirs X whose samples live in the domains `at`."""
+    """One input of a pass: reservoirs X whose samples live in the domains `at`.
+
+    >>> import numpy as np
+    >>> from restir_ref import Input, Live, Pixels, initial
+    >>> from toy1d import two_pixels
+    >>> at = Pixels(two_pixels(), np.array([1, 0]))
+    >>> Input(initial(at, Live(np.random.default_rng(1))), at).X.c
+    array([1, 1])
+    """
 
     X: Reservoirs
     at: Pixels
@@ -55,6 +63,17 @@ def weigh(inputs: Sequence[Input], here: Pixels, mis: Weights) -> Iterator[Candi
     Inputs whose `at` *is* `here` are canonical: same domain, identity shift.
     Raises ValueError for no inputs, unequal batches, bad W or c, or no canonical input where
     the weights need one.
+
+    >>> import numpy as np
+    >>> from restir_ref import WEIGHTS, Input, Live, Pixels, initial, weigh
+    >>> from toy1d import two_pixels
+    >>> line, chance = two_pixels(), Live(np.random.default_rng(1))
+    >>> here, near = Pixels(line, np.array([0, 1])), Pixels(line, np.array([1, 0]))
+    >>> inputs = [Input(initial(at, chance), at) for at in (here, near)]
+    >>> for y in weigh(inputs, here, WEIGHTS["talbot"]):
+    ...     print(y.x.round(3), y.mW.round(3))
+    [0.512 0.95 ] [0.287 0.227]
+    [0.312 0.423] [0.13  0.599]
     """
     c = _confidences(inputs, here, mis)
     landed = _landed(inputs, here)
@@ -83,6 +102,15 @@ def select(candidates: Iterable[Candidate], chance: Chance, c: Array) -> Reservo
     Where all w_i are 0 the result is a null sample: the first candidate with W = 0, and the
     confidence c (N,) all the same.  Raises ValueError for no candidates, for negative, NaN or
     infinite weights, and where their sum or W_Y overflows.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, select
+    >>> from restir_ref.resampling import Candidate
+    >>> one, other = np.ones(1), np.full(1, 3.0)
+    >>> offered = [Candidate(0.2 * one, p_hat=one, mW=one / 2), Candidate(0.8 * one, p_hat=other, mW=one / 2)]
+    >>> Y = select(offered, Live(np.random.default_rng(1)), c=one)
+    >>> Y.x, Y.W.round(3)  # W = sum w / p_hat(Y) = 2 / 3
+    (array([0.8]), array([0.667]))
     """
     offered = list(candidates)
     w = _stacked([resampling_weight(each) for each in offered])
@@ -113,6 +141,16 @@ def gris(inputs: Sequence[Input], here: Pixels, mis: Weights, chance: Chance) ->
 
     [GRIS 6.2] stores min(M_c, sum of confidences); here the sum is stored, and `restir.temporal`
     caps the history when it comes in.  Both are unbiased.
+
+    >>> import numpy as np
+    >>> from restir_ref import WEIGHTS, Input, Live, Pixels, gris, initial, shade
+    >>> from toy1d import two_pixels
+    >>> line, chance, index = two_pixels(), Live(np.random.default_rng(1)), np.arange(20_000)
+    >>> here, near = Pixels(line, index), Pixels(line, index ^ 1)
+    >>> X, Z = initial(here, chance), initial(near, chance)
+    >>> Y = gris([Input(X, here), Input(Z, near)], here, WEIGHTS["talbot"], chance)
+    >>> shade(Y, here).reshape(-1, 2).mean(axis=0).round(2)
+    array([1.  , 0.98])
     """
     chosen = list(weigh(inputs, here, mis))
     C = Confidences(_counts(inputs), ()).C

@@ -22,7 +22,18 @@ M_CAP = 20
 
 
 def initial(here: Pixels, chance: Chance, M: int = 1) -> Reservoirs:
-    """RIS: resample M independent sets of candidates into one sample of confidence 1.  [GRIS Eq. 1-6; 6.3]"""
+    """RIS: resample M independent sets of candidates into one sample of confidence 1.  [GRIS Eq. 1-6; 6.3]
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial, shade
+    >>> from toy1d import two_pixels
+    >>> here = Pixels(two_pixels(), np.full(10_000, 1))
+    >>> for M in (1, 16):
+    ...     estimates = shade(initial(here, Live(np.random.default_rng(1)), M), here)[0]
+    ...     print(M, estimates.mean().round(2), estimates.std().round(2))
+    1 1.0 1.03
+    16 1.0 0.26
+    """
     whole(M, 1, "the number M of candidate sets", "Leave it out for one set.")
     drawn = ((x, mW / M) for _ in range(M) for x, mW in here.of.candidates(here.index, chance))
     return resample(drawn, here, chance)
@@ -64,6 +75,16 @@ def temporal(
     Y holds the whole previous frame, column k at place k; each of `before` names one source column per
     pixel (motion vectors), in the previous frame's integrals, or `NOWHERE` where there is no history.
     The confidence of history is capped on entry, c <- min(c, cap), where [GRIS 6.2] caps the result of a merge.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial, shade, temporal
+    >>> from toy1d import two_pixels
+    >>> here, chance = Pixels(two_pixels(), np.arange(20_000)), Live(np.random.default_rng(1))
+    >>> Y = initial(here, chance)
+    >>> for frame in range(5):
+    ...     Y = temporal(initial(here, chance), here, Y, [here], chance, cap=20)  # nothing moves
+    >>> shade(Y, here).reshape(-1, 2).mean(axis=0).round(2), Y.c[:2]
+    (array([1.  , 0.99]), array([6., 6.]))
     """
     return gris(reusing(X, here, capped(Y, cap), before), here, mis, chance)
 
@@ -76,7 +97,17 @@ def spatial(
     *,
     mis: Weights = WEIGHTS["defensive"],
 ) -> Reservoirs:
-    """Resample every pixel's reservoir with its neighbours', all in X.  [GRIS 6.3 step 3]"""
+    """Resample every pixel's reservoir with its neighbours', all in X.  [GRIS 6.3 step 3]
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial, shade, spatial
+    >>> from toy1d import two_pixels
+    >>> line, chance = two_pixels(), Live(np.random.default_rng(1))
+    >>> here = Pixels(line, np.arange(20_000))
+    >>> Y = spatial(initial(here, chance), here, [Pixels(line, here.index ^ 1)], chance)  # the other of two pixels
+    >>> shade(Y, here).reshape(-1, 2).mean(axis=0).round(2), Y.c[:2]
+    (array([1.01, 0.98]), array([2., 2.]))
+    """
     return gris(reusing(X, here, X, neighbours), here, mis, chance)
 
 
@@ -87,18 +118,43 @@ def reuse_all(
     *,
     mis: Weights = WEIGHTS["talbot"],
 ) -> Array:
-    """sum_i f(Y_i) c_i W_i J_i: shift all, select none; (C, N).  [GRIS Eq. 13-14; Bekaert 2002]"""
+    """sum_i f(Y_i) c_i W_i J_i: shift all, select none; (C, N).  [GRIS Eq. 13-14; Bekaert 2002]
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial, reuse_all
+    >>> from toy1d import two_pixels
+    >>> line = two_pixels()
+    >>> here = Pixels(line, np.arange(20_000))
+    >>> X = initial(here, Live(np.random.default_rng(1)))
+    >>> reuse_all(X, here, [Pixels(line, here.index ^ 1)]).reshape(-1, 2).mean(axis=0).round(2)
+    array([1.01, 0.98])
+    """
     shifted = weigh(reusing(X, here, X, neighbours), here, mis)
     return total([weighted(here, y.x, contribution_weight(y)) for y in shifted])
 
 
 def shade(X: Reservoirs, here: Pixels) -> Array:
-    """<I> = f(X) W, and 0 for null samples; shape (C, N).  [GRIS Eq. 3; 6.3 step 4]"""
+    """<I> = f(X) W, and 0 for null samples; shape (C, N).  [GRIS Eq. 3; 6.3 step 4]
+
+    >>> import numpy as np
+    >>> from restir_ref import Pixels, Reservoirs, shade
+    >>> from toy1d import two_pixels
+    >>> X = Reservoirs(np.array([0.4, 0.4]), W=np.array([1.0, 0.0]), c=np.ones(2))  # the second is a null sample
+    >>> shade(X, Pixels(two_pixels(), np.array([0, 0]))).round(3)
+    array([[1.529, 0.   ]])
+    """
     return weighted(here, X.x, X.W)
 
 
 def capped(X: Reservoirs, cap: float) -> Reservoirs:
-    """Confidence c <- min(c, M_c); needs cap > 0, for a null confidence is biased.  [GRIS 6.4]"""
+    """Confidence c <- min(c, M_c); needs cap > 0, for a null confidence is biased.  [GRIS 6.4]
+
+    >>> import numpy as np
+    >>> from restir_ref import Reservoirs
+    >>> from restir_ref.restir import capped
+    >>> capped(Reservoirs(np.zeros(2), np.ones(2), c=np.array([3, 90])), 20).c
+    array([ 3, 20])
+    """
     positive(cap, "the cap M_c", "leave temporal reuse out instead.")
     return replace(X, c=np.minimum(wide(X.c), cap))
 

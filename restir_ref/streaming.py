@@ -34,6 +34,15 @@ def select_streaming(candidates: Iterable[Candidate], chance: Chance, c: Array) 
     """As `resampling.select`, without holding more than one candidate.  [GRIS Eq. 21-22]
 
     Raises ValueError as it does.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live
+    >>> from restir_ref.resampling import Candidate
+    >>> from restir_ref.streaming import select_streaming
+    >>> offered = (Candidate(np.array([x]), p_hat=np.array([x]), mW=np.array([1 / 3])) for x in (0.2, 0.5, 0.8))
+    >>> Y = select_streaming(offered, Live(np.random.default_rng(1)), c=np.array([1]))
+    >>> Y.x, Y.W.round(3)  # W = .5 / .8
+    (array([0.8]), array([0.625]))
     """
     stream = None
     for new in candidates:

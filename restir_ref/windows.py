@@ -26,6 +26,17 @@ def windowed(size: int) -> Passes:
     """The passes of `restir` over windows of `size` columns: the same reservoirs, memory for a window beside them.
 
     They ask for a `Live` chance, and for integrals whose columns do not know of each other.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels
+    >>> from restir_ref.loop import REAL_TIME, frame, random_in_row
+    >>> from restir_ref.windows import windowed
+    >>> from toy1d import image_of_64
+    >>> here = Pixels(image_of_64(), np.arange(640))
+    >>> whole = frame(here, Live(np.random.default_rng(1)), REAL_TIME, random_in_row)
+    >>> parts = frame(here, Live(np.random.default_rng(1)), REAL_TIME, random_in_row, passes=windowed(100))
+    >>> bool((whole.W == parts.W).all())
+    True
     """
 
     def first(here: Pixels, chance: Chance, M: int = 1) -> Reservoirs:

@@ -24,7 +24,15 @@ Holes = Callable[[Array, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Chart:
-    """The common coordinate z = to(pixel, x), its inverse x = back(pixel, z), and dz/dx = slope(pixel, x)."""
+    """The common coordinate z = to(pixel, x), its inverse x = back(pixel, z), and dz/dx = slope(pixel, x).
+
+    >>> import numpy as np
+    >>> from toy1d import Chart, Line
+    >>> stretched = Chart(lambda i, x: x / (i + 1), lambda i, z: z * (i + 1), lambda i, x: 1 / (i + 1.0))
+    >>> line = Line(lambda pixel, x: np.ones(len(x)), np.zeros(2), np.array([1.0, 2.0]), stretched)
+    >>> line.chart.to(np.array([1]), np.array([1.5]))
+    array([0.75])
+    """
 
     to: Function = lambda pixel, x: x
     back: Function = lambda pixel, z: z
@@ -33,7 +41,14 @@ class Chart:
 
 @dataclass(frozen=True)
 class Technique:
-    """A way to sample a domain scaled to [0, 1): s = sample(pixel, u) of density pdf(pixel, s); uniform by default."""
+    """A way to sample a domain scaled to [0, 1): s = sample(pixel, u) of density pdf(pixel, s); uniform by default.
+
+    >>> import numpy as np
+    >>> from toy1d import Technique
+    >>> towards_one = Technique(lambda i, u: np.sqrt(u), lambda i, s: 2 * s)
+    >>> towards_one.sample(np.zeros(1), np.array([0.25])), towards_one.pdf(np.zeros(1), np.array([0.5]))
+    (array([0.5]), array([1.]))
+    """
 
     sample: Function = lambda pixel, u: u
     pdf: Function = lambda pixel, s: np.ones_like(s)
@@ -55,6 +70,15 @@ class Line:
 
     f is the brightness |f|, which is also the target; chroma(pixel, x) = f / |f| has shape (C, N) and mean 1.
     Every technique draws one candidate; they need not all cover the domain.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live, Pixels, initial, shade
+    >>> from toy1d import Line
+    >>> squares = Line(lambda pixel, x: (pixel + 1) * x**2, low=np.zeros(2), high=np.array([1.0, 2.0]))
+    >>> here = Pixels(squares, np.arange(40_000))
+    >>> X = initial(here, Live(np.random.default_rng(1)), M=4)
+    >>> shade(X, here).reshape(-1, 2).mean(axis=0).round(2)  # 1/3, 16/3
+    array([0.33, 5.34])
     """
 
     f: Function
@@ -119,6 +143,12 @@ def quotient(line: Line, K: int) -> Frame:
     """The same integrals on K cells, uniform in z, integrands constant on each: an exact finite problem.
 
     Cells belong to a pixel's domain if their middle does; align K with the domains' ends.
+
+    >>> import numpy as np
+    >>> from toy1d import quotient, two_pixels
+    >>> frame = quotient(two_pixels(), 32)
+    >>> frame.n, frame.cells.v.shape
+    (2, (2, 32))
     """
     pixel, n = np.arange(line.n)[:, None], line.n
     ends = line.chart.to(pixel, np.stack([line.low, line.high], axis=-1))

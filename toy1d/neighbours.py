@@ -13,6 +13,11 @@ def overlapping_supports() -> Line:
     At distance d = pixel - 3 the integrand is .1 + exp(-(x - .5 - .08 d)^2 / (2 * .12^2)) on
     [.2 + .08 |d|, .8 + .08 d), so the number Z(y) of pixels that can realise y climbs from 1 at
     y = .2 to 7: weights that assume all seven everywhere lose energy.
+
+    >>> from toy1d import overlapping_supports
+    >>> line = overlapping_supports()
+    >>> line.n, line.low.round(2), line.high.round(2)
+    (7, array([0.44, 0.36, 0.28, 0.2 , 0.28, 0.36, 0.44]), array([0.56, 0.64, 0.72, 0.8 , 0.88, 0.96, 1.04]))
     """
     d = np.arange(-3, 4)
 
@@ -28,6 +33,10 @@ def degrading_neighbours() -> Line:
     Pixel 32 + d integrates max(1 - s^2, 0)^2 with s = (x - .5 - .0125 d) / .1 over [0, 1].  The others sample
     exactly in proportion to their own integrand, so each of their samples is perfect at home; the centre
     samples half its integrand and half uniformly.  Wide windows crowd out its one sample where only it can look.
+
+    >>> from toy1d import degrading_neighbours
+    >>> degrading_neighbours().n
+    65
     """
     radius, count = 0.1, 65
 
@@ -57,6 +66,10 @@ def overstating_neighbours(share: float = 0.01) -> Line:
 
     f = .1 + exp(-(x - .5)^2 / (2 * .12^2)) on [0, 1] for all.  The centre samples uniformly; the others have
     `share` of that density on [.4, .6), the rest evenly elsewhere: p_hat overstates their sampler there.
+
+    >>> from toy1d import overstating_neighbours
+    >>> overstating_neighbours(share=0.1).n
+    7
     """
     outside = (1 - 0.2 * share) / 0.8
     masses = np.cumsum([0, 0.4 * outside, 0.2 * share, 0.4 * outside])

@@ -11,6 +11,10 @@ def image_of_64() -> Line:
 
     f_i = amp_i (.05 + exp(-((x - mu_i)/.04)^2)), mu_i = .15 ... .85, amp_i = 1 + .6 sin(4 pi i / 63), uniform
     samples: the ten pixels within radius 5 overlap enough to share, the rest do not.
+
+    >>> from toy1d import image_of_64
+    >>> image_of_64().n
+    64
     """
     i = np.arange(64)
     mu, amp = 0.15 + 0.7 * i / 63, 1 + 0.6 * np.sin(4 * np.pi * i / 63)
@@ -25,6 +29,10 @@ def ring_of_8() -> Line:
     """Eight pixels in a ring, small enough for exact moments of temporal and spatial reuse.  [GRIS Fig. 9]
 
     f_i = .02 + exp(-(x - .5 - .2 sin(2 pi i / 8))^2 / (2 * .12^2)) on [0, 1], uniform samples.
+
+    >>> from toy1d import ring_of_8
+    >>> ring_of_8().n
+    8
     """
     centre = 0.5 + 0.2 * np.sin(2 * np.pi * np.arange(8) / 8)
 

@@ -17,6 +17,12 @@ def two_pixels() -> Line:
 
     f_1 = 1 + .9 sin(2 pi x),  f_2 = .2 + 3 exp(-((x - .6)/.15)^2).  Each frame brings two new
     samples; without a cap on confidence all others are duplicates.
+
+    >>> import numpy as np
+    >>> from toy1d import two_pixels
+    >>> line = two_pixels()
+    >>> line.n, line.low, line.high
+    (2, array([0., 0.]), array([1., 1.]))
     """
 
     def f(pixel: Array, x: Array) -> Array:
@@ -31,6 +37,14 @@ def known_densities() -> Line:
 
     f_1 = 1 + .9 sin(2 pi x),  f_2 = .1 + exp(-((x - .3)/.08)^2) + exp(-((x - .75)/.05)^2) / 2;
     p_1 = 1, p_2 = 2 x, and p_3 = 2 on [.5, 1), which does not cover: weights 1/M lose a third of the left half.
+
+    >>> import numpy as np
+    >>> from restir_ref import Pixels
+    >>> from restir_ref.chance import Live
+    >>> from toy1d import known_densities
+    >>> line = known_densities()
+    >>> len(list(line.candidates(np.zeros(1, dtype=int), Live(np.random.default_rng(1)))))  # one per technique
+    3
     """
 
     def f(pixel: Array, x: Array) -> Array:
@@ -46,6 +60,12 @@ def three_channels() -> Line:
     """TC: one pixel of colour f = (1 + sin 2 pi x, 1 + cos 2 pi x, .5 + x) on [0, 1].  [GRIS Eq. 46-47]
 
     The target is the brightness |f|, the mean of the channels, which knows nothing of the chroma f / |f|.
+
+    >>> import numpy as np
+    >>> from toy1d import three_channels
+    >>> line = three_channels()
+    >>> line.contribution(np.array([0]), np.array([0.5])).shape
+    (3, 1)
     """
 
     def colour(x: Array) -> Array:

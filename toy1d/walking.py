@@ -12,7 +12,12 @@ from toy1d.line import Line
 
 @dataclass(frozen=True, eq=False)
 class Walking(Line):
-    """A line, sampled uniformly, with mutations that step the primary sample number u = (x - low) / (high - low)."""
+    """A line, sampled uniformly, with mutations that step the primary sample number u = (x - low) / (high - low).
+
+    >>> from toy1d import Walking, two_pixels, walking
+    >>> isinstance(walking(two_pixels()), Walking)
+    True
+    """
 
     sigma: float = 0.02
     step: Step = wrapped
@@ -26,6 +31,15 @@ class Walking(Line):
 
 
 def walking(line: Line, sigma: float = 0.02, step: Step = wrapped) -> Walking:
-    """The same line with mutations."""
+    """The same line with mutations.
+
+    >>> import numpy as np
+    >>> from restir_ref import Live
+    >>> from toy1d import two_pixels, walking
+    >>> line = walking(two_pixels(), sigma=0.1)
+    >>> x, ratio = line.propose(np.array([0, 1]), np.array([0.5, 0.5]), Live(np.random.default_rng(1)))
+    >>> x.round(2), ratio
+    (array([0.5 , 0.66]), array([1., 1.]))
+    """
     same = {each.name: getattr(line, each.name) for each in fields(Line)}
     return Walking(**same, sigma=sigma, step=step)

@@ -33,6 +33,11 @@ class Setting:
     crop  column and row of the film at which the inset begins;  half  tangent of half the film's field of view
     pace  pixels of the film, to the right and up, by which a moving camera slides from frame to frame
     Raises ValueError for a depth that is no whole number >= 1, and for an eye in a solid or one that sees nothing.
+
+    >>> from tracer3d import setting
+    >>> room = setting("cornell")
+    >>> room.pinhole(16, 8).n, room.view(32, 18).shape
+    (128, (18, 32))
     """
 
     scene: Scene
@@ -228,5 +233,10 @@ SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
 
 
 def setting(name: str) -> Setting:
-    """The scene of that name.  Raises ValueError for an unknown one, with the nearest."""
+    """The scene of that name.  Raises ValueError for an unknown one, with the nearest.
+
+    >>> from tracer3d import SCENES, setting
+    >>> setting("cornell").depth, "furnace" in SCENES
+    (4, True)
+    """
     return known(SCENES, name, "scene")()

@@ -27,6 +27,13 @@ class Pinhole:
     horizontal field of view, and the film's pixels are square.  Pixels are numbered row by row from the top left.
     Raises ValueError for points without 3 coordinates, a crop that is empty, not on the film or not of
     whole pixels, no direction, one along `up`, or no field of view.
+
+    >>> import numpy as np
+    >>> from tracer3d import setting
+    >>> eye = setting("cornell").pinhole(8, 4)
+    >>> x, w, _ = eye.ray(np.arange(eye.n), np.full((eye.numbers, eye.n), 0.5))
+    >>> eye.shape, w.shape
+    ((4, 8), (3, 32))
     """
 
     eye: Point
@@ -175,7 +182,12 @@ def facing(scene: Scene, sensor: Sensor, at: float = 0.5) -> Array:
 
 
 def check_view(scene: Scene, sensor: Sensor) -> None:
-    """Raise ValueError if no pixel sees the front of a surface: the sensor is inside a solid, or looks elsewhere."""
+    """Raise ValueError if no pixel sees the front of a surface: the sensor is inside a solid, or looks elsewhere.
+
+    >>> from tracer3d import check_view, setting
+    >>> room = setting("cornell")
+    >>> check_view(room.scene, room.pinhole(8, 8))
+    """
     if not (facing(scene, sensor) > 0).any():
         raise ValueError(
             f"{sensor} sees only backs of surfaces, or nothing: it stands in a solid or looks past everything. "

@@ -95,6 +95,14 @@ def audit_dump(source: Path | str | Mapping[str, Any], *, rtol: float = RTOL) ->
 
     The terms follow each other: J, p_hat_own, p_hat_back, J_back, p_hat_from, m, w, w_sum, s, W_Y, c_Y.
     Raises BadDump, a ValueError, for what cannot be read; `docs/audit.md` has the format.
+
+    >>> from restir_ref.audit import audit_dump
+    >>> dump = {"format": "restir-ref dump", "version": 1, "mis": "constant"}
+    >>> dump |= {"p_hat": [[2.0], [1.0]], "W": [[1.0], [1.0]], "c": [[1.0], [1.0]]}
+    >>> print(str(audit_dump({**dump, "w": [[1.0], [0.5]], "w_sum": [1.5]})).splitlines()[0])
+    right: J, w, w_sum ('constant' weights, M = 2 inputs, N = 1 columns)
+    >>> print(str(audit_dump({**dump, "w": [[1.0], [2.5]], "w_sum": [3.5]})).splitlines()[0])
+    WRONG: w[1] in column 0: expected 0.5, found 2.5 (wrong in 1 column)
     """
     with TemporaryDirectory(prefix="restir-ref-audit-") as folder:
         return _report(opened(source, Path(folder)), rtol)

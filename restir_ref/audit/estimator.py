@@ -89,6 +89,17 @@ def audit_estimator(
     `index` (N,) = lane * n + pixel, and draws everything by `chance.choose(weights)`, weights (options, N).
     Raises CannotAudit, a ValueError, if it does not, and ValueError with an estimate of the number of
     leaves if there are more than `most_leaves`.
+
+    >>> from restir_ref import Pixels, initial
+    >>> from restir_ref.audit import audit_estimator
+    >>> from restir_ref.oracle.scenes import offset, reference_scene
+    >>> scene = reference_scene()
+    >>> right = audit_estimator(lambda index, chance: initial(Pixels(scene.now, index), chance), scene)
+    >>> wrong = audit_estimator(lambda index, chance: initial(offset(scene.now, index, 1), chance), scene)
+    >>> right.unbiased, wrong.unbiased  # the second takes the neighbour's sample without a shift
+    (True, False)
+    >>> print(str(wrong).splitlines()[0])
+    BIASED: +300.00% in cell 2 of pixel 0, exact over 16 outcomes
     """
     whole = _whole(estimator, scene)
     asked = rehearse(estimator, scene.v)

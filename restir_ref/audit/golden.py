@@ -16,7 +16,12 @@ GOLDEN = "restir-ref golden vectors"
 
 
 def golden_vectors(mis: str) -> Any:
-    """The golden vectors of a weight as they ship with the package; raises ValueError unless it is one of KNOWN."""
+    """The golden vectors of a weight as they ship with the package; raises ValueError unless it is one of KNOWN.
+
+    >>> from restir_ref.audit import golden_vectors
+    >>> sorted(golden_vectors("pairwise")["cases"][0]["expected"])
+    ['W_Y', 'W_Y_stream', 'c_Y', 'm', 's', 's_stream', 'w', 'w_sum']
+    """
     if mis not in KNOWN:
         raise ValueError(f"there are no golden vectors for {mis!r} weights, only for {', '.join(map(repr, KNOWN))}.")
     text = resources.files("restir_ref.audit").joinpath("data", file_name(mis)).read_text(encoding="utf-8")

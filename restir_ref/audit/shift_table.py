@@ -76,6 +76,15 @@ def audit_shift_table(
 
     `back` (d, N) and J_back (N,) are what the shift of y back came to, if that was dumped as well.
     Raises ValueError for shapes that do not fit.
+
+    >>> import numpy as np
+    >>> from restir_ref.audit import audit_shift_table
+    >>> x = np.random.default_rng(1).random((1, 400))
+    >>> right, wrong = (audit_shift_table(x, x**2, J) for J in (2 * x[0], np.ones(400)))
+    >>> print(str(right).splitlines()[0])
+    right, as far as the table shows
+    >>> print(str(wrong).splitlines()[0])
+    WRONG: slope
     """
     x, y, J = (np.asarray(each, dtype=float) for each in (x, y, J))
     _check(x, y, J)

@@ -89,6 +89,14 @@ def outcomes(program: Program[Result], n: int, most_leaves: int = MOST_LEAVES) -
     Raises ValueError when there are more than `most_leaves`, with an estimate of how many there are,
     and where calls of `choose` do not fit the columns or each other; TypeError when the program
     draws continuous numbers.
+
+    >>> import numpy as np
+    >>> from restir_ref.oracle.enumeration import outcomes
+    >>> def two_coins(index, chance):
+    ...     return chance.choose(np.ones((2, len(index)))) + chance.choose(np.ones((2, len(index))))
+    >>> for each in outcomes(two_coins, 1):
+    ...     print(each)
+    Outcome(result=array([0, 1, 1, 2]), probability=array([0.25, 0.25, 0.25, 0.25]))
     """
     open_lanes, leaves = [Lanes([], np.ones(1, dtype=int))], 0
     while open_lanes:

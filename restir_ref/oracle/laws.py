@@ -51,6 +51,15 @@ def bias_of(program: Program[Reservoirs], v: Array, support: Array) -> Array:
     """Exact relative bias per cell of a program whose samples are cell numbers; (n, K).
 
     Raises ValueError if lanes leak into one another: what a leak does depends on which lanes are run together.
+
+    >>> import numpy as np
+    >>> from restir_ref import Pixels, initial
+    >>> from restir_ref.oracle.laws import bias_of
+    >>> from restir_ref.oracle.scenes import reference_scene
+    >>> scene = reference_scene()
+    >>> bias = bias_of(lambda index, chance: initial(Pixels(scene.now, index), chance), scene.v, scene.support)
+    >>> bool(abs(bias).max() < 1e-12)
+    True
     """
     return bias_per_cell(expected_weight(_watched(program, len(v)), v), v, support)
 

@@ -242,6 +242,12 @@ def reference_scene(of: type[Frame] = Frame) -> Scene:
 
     Every pixel has a cell of zero target that its sampler reaches, or one that it does not cover;
     every shift but the identity has a hole; volumes differ by up to 4.
+
+    >>> from restir_ref.oracle.scenes import reference_scene
+    >>> scene = reference_scene()
+    >>> scene.now.n, scene.support
+    (2, array([[ True, False,  True,  True],
+           [ True,  True,  True,  True]]))
     """
     v = [[1.0, 0.5, 2.0, 1.0], [0.5, 1.0, 1.0, 2.0], [1.0, 2.0, 0.5, 1.0], [0.5, 1.0, 2.0, 0.5]]
     shifts = {

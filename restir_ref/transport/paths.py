@@ -51,6 +51,10 @@ class Connectability:
 
     Roughness is perceptual, distance in scene units.  Delta lobes never connect.
     Raises ValueError for thresholds that are negative or NaN; infinite ones are never met.
+
+    >>> from restir_ref.transport.paths import RECONNECTION, Connectability
+    >>> Connectability(roughness=0.2, distance=0.02), RECONNECTION
+    (Connectability(roughness=0.2, distance=0.02), Connectability(roughness=0.0, distance=0.0))
     """
 
     roughness: float
@@ -79,6 +83,13 @@ class Tracer:
     """A scene seen by a sensor, up to `depth` scattering vertices, with a rule for connections.
 
     Raises ValueError for a depth that is no whole number >= 1, or a sensor of another dimension than the scene.
+
+    >>> from flatland2d import setting
+    >>> from restir_ref.transport.paths import Connectability, Tracer
+    >>> room = setting("cornell")
+    >>> t = Tracer(room.scene, room.pinhole(128), depth=3, rule=Connectability(roughness=0.2, distance=0.02))
+    >>> t.D  # random numbers of a path: one for the film, four for each of three vertices
+    13
     """
 
     scene: Scene
@@ -236,6 +247,16 @@ def trace(t: Tracer, u: Array, pixel: Array) -> Tree:
     """The whole tree of a primary sample u (D, N).
 
     Raises ValueError for u of another shape.
+
+    >>> import numpy as np
+    >>> from flatland2d import setting
+    >>> from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
+    >>> room = setting("cornell")
+    >>> t = Tracer(room.scene, room.pinhole(16), room.depth, RECONNECTION)
+    >>> pixel = np.arange(16 * 100) % 16
+    >>> L = radiance(trace(t, np.random.default_rng(1).random((t.D, len(pixel))), pixel))
+    >>> L.shape, bool((L >= 0).all())
+    ((1, 1600), True)
     """
     if u.shape != (t.D, len(pixel)):
         raise ValueError(
@@ -300,5 +321,15 @@ def leaves(tree: Tree) -> Iterator[tuple[int, bool, Array]]:
 
 
 def radiance(tree: Tree) -> Array:
-    """Sum of all leaves, (C, N): plain path tracing."""
+    """Sum of all leaves, (C, N): plain path tracing.
+
+    >>> import numpy as np
+    >>> from flatland2d import setting
+    >>> from restir_ref.transport.paths import RECONNECTION, Tracer, radiance, trace
+    >>> room = setting("furnace")
+    >>> t = Tracer(room.scene, room.pinhole(4), room.depth, RECONNECTION)
+    >>> tree = trace(t, np.random.default_rng(1).random((t.D, 4000)), np.arange(4000) % 4)
+    >>> radiance(tree).mean().round(1)
+    np.float64(2.0)
+    """
     return np.asarray(sum(F for _, _, F in leaves(tree)))

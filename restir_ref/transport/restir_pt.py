@@ -17,7 +17,22 @@ from restir_ref.transport.subtrees import of_leaf, one_of
 
 @dataclass(frozen=True, eq=False)
 class PathIntegrals:
-    """The pixels' path integrals in primary sample space; p_hat is the mean of F over channels."""
+    """The pixels' path integrals in primary sample space; p_hat is the mean of F over channels.
+
+    >>> import numpy as np
+    >>> from flatland2d import setting
+    >>> from restir_ref import Live, Pixels, initial, shade, spatial
+    >>> from restir_ref.loop import random_in_row
+    >>> from restir_ref.transport.paths import Connectability, Tracer
+    >>> from restir_ref.transport.restir_pt import PathIntegrals
+    >>> room, chance = setting("crease"), Live(np.random.default_rng(1))
+    >>> row = PathIntegrals(Tracer(room.scene, room.pinhole(32), 2, Connectability(roughness=0.2, distance=0.02)))
+    >>> here = Pixels(row, np.arange(20 * row.n))
+    >>> X = initial(here, chance)
+    >>> Y = spatial(X, here, random_in_row(row, here.index, 3, 8, chance), chance)
+    >>> bool(shade(Y, here).std() < shade(X, here).std())
+    True
+    """
 
     tracer: Tracer
 

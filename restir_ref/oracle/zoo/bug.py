@@ -15,6 +15,10 @@ class Bug:
     """A named deliberate error: how it gets into renderers, what it looks like, what it breaks.
 
     `right` and `wrong` are made of the same parts but one.
+
+    >>> from restir_ref.oracle.zoo import BUGS
+    >>> BUGS["divided by M twice"].symptom
+    'dark to 1/M, at every number of candidates'
     """
 
     name: str
@@ -37,5 +41,13 @@ def family(bugs: Iterable[Bug]) -> Mapping[str, Bug]:
 
 
 def exact_bias(loop: Loop, scene: Scene) -> Array:
-    """Relative bias per cell of a loop on a scene, enumerated; (n, K)."""
+    """Relative bias per cell of a loop on a scene, enumerated; (n, K).
+
+    >>> from restir_ref.oracle.zoo import BUGS, exact_bias
+    >>> bug = BUGS["Jacobian left out"]
+    >>> scene = bug.scene()
+    >>> right, wrong = (exact_bias(loop(scene), scene) for loop in (bug.right, bug.wrong))
+    >>> bool(abs(right).max() < 1e-12), float(wrong.max().round(3))
+    (True, 0.4)
+    """
     return bias_of(loop, scene.v, scene.support)

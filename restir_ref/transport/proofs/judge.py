@@ -82,6 +82,21 @@ def judge(
     """Hold checks against the shift of `of`; `numbers` says which primary sample an offset path has.
 
     Raises ValueError for fewer than two pixels, and where J is negative, NaN or infinite.
+
+    >>> import numpy as np
+    >>> from flatland2d import setting
+    >>> from restir_ref import Live
+    >>> from restir_ref.transport.paths import Connectability, Tracer
+    >>> from restir_ref.transport.proofs.judge import Effort, judge
+    >>> from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
+    >>> from restir_ref.transport.restir_pt import PathIntegrals
+    >>> room, few = setting("crease"), Effort(paths=1000, jacobians=40)
+    >>> t = Tracer(room.scene, room.pinhole(32), 2, Connectability(roughness=0.2, distance=0.02))
+    >>> judge(PathIntegrals(t), Live(np.random.default_rng(1)), few).red
+    ()
+    >>> careless = TRANSPORT_BUGS["geometric Jacobian left out"].wrong(t)
+    >>> judge(careless, Live(np.random.default_rng(1)), few).red
+    ('finite differences', 'change of variables')
     """
     if of.n < 2:
         raise ValueError(f"a shift needs two pixels to be judged, but the sensor has {of.n}.")

@@ -14,6 +14,10 @@ class TransportBug:
 
     `wrong` makes the integrals that err.  `caught_by` names those of `CHECKS` that see it in a scene that suits
     it, and the tests measure that anew; the others stayed silent there.
+
+    >>> from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
+    >>> TRANSPORT_BUGS["distances swapped"].caught_by
+    ('finite differences', 'change of variables', 'spread over pixels', 'mean of the image')
     """
 
     name: str

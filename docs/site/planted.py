@@ -1,0 +1,291 @@
+"""Every mistake of the zoo planted in flatland: `python -m docs.site.planted` draws docs/symptoms/*.png, half an hour.
+
+The zoo's loops know their integrals by the protocol only, so they run on path integrals as they are: `Film` stands in
+for a finite scene, and `Flat` for its frames.  Neighbours are taken from a disk instead of a table.  Where a mistake is
+made of cells (a table of densities, a sampler's index), its picture is that of its own small scene, and exact.
+"""
+
+import argparse
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image as Raster
+
+from docs.site.symptoms import slug
+from figures.report import style
+from flatland2d import setting
+from flatland2d.pictures import outline
+from flatland2d.scenes import Setting
+from restir_ref.batch import Array
+from restir_ref.chance import Chance, Live
+from restir_ref.images import random_in_disk
+from restir_ref.integrals import NOWHERE, Image, Pixels, Reservoirs, Shifted
+from restir_ref.oracle.cells import Frame
+from restir_ref.oracle.scenes import Loop, Parts, next_pixel
+from restir_ref.oracle.zoo import BUGS, INEFFICIENT, Bug, exact_bias
+from restir_ref.restir import initial, shade, spatial, temporal
+from restir_ref.transport.paths import Connectability, Tracer
+from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
+from restir_ref.transport.proofs.zoo.bug import TransportBug
+from restir_ref.transport.restir_pt import PathIntegrals, ScatteredIntegrals
+
+FOLDER = Path(__file__).resolve().parents[1] / "symptoms"
+SIDE, RADIUS, DEPTH, RULE = 40, 5, 2, Connectability(roughness=0.2, distance=0.02)
+REPLICAS, BATCHES = 60, 4
+"""Images at a time, and how many times."""
+
+EXPOSURE = 1 / 3
+"""Brings targets near 1, where thresholds of the zoo are meant to be."""
+
+STEP = 4
+"""Pixels by which the map moves between two frames, for the mistake that is about motion."""
+
+
+@cache
+def room() -> Setting:
+    """Two boxes in a room: shadows, corners, a glossy side."""
+    return setting("cornell")
+
+
+def seen(step: float = 0) -> ScatteredIntegrals:
+    """Its fluence, SIDE x SIDE pixels, moved by so many pixels to the left."""
+    sensor = room().fluence(SIDE, SIDE)
+    by = step * (sensor.high[0] - sensor.low[0]) / SIDE
+    (x, y), (X, Y) = sensor.low, sensor.high
+    return ScatteredIntegrals(Tracer(room().scene, replace(sensor, low=(x - by, y), high=(X - by, Y)), DEPTH, RULE))
+
+
+# ---------------------------------------------------------------- loops of the zoo in flatland
+
+
+class Flat(Frame):
+    """A frame of the zoo whose cells are path integrals."""
+
+    @property
+    def of(self) -> PathIntegrals:
+        """The path integrals."""
+        found: PathIntegrals = self.cells  # type: ignore[assignment]
+        return found
+
+    def candidates(self, index: Array, chance: Chance) -> Iterator[tuple[Any, Array]]:
+        """One path tree."""
+        return self.of.candidates(index, chance)
+
+    def target(self, index: Array, x: Any) -> Array:
+        """p_hat, exposed."""
+        return self.of.target(index, x) * EXPOSURE
+
+    def contribution(self, index: Array, x: Any) -> Array:
+        """F, exposed."""
+        return self.of.contribution(index, x) * EXPOSURE
+
+    def shift(self, x: Any, index: Array, to: Pixels) -> Shifted:
+        """The hybrid shift."""
+        there: Flat = to.of  # type: ignore[assignment]
+        return self.of.shift(x, index, Pixels(there.of, to.index))
+
+
+@dataclass(frozen=True)
+class Film:
+    """Two frames of the same view, in place of a finite scene."""
+
+    frames: tuple[Frame, ...]
+
+    @property
+    def now(self) -> Frame:
+        """The last one."""
+        return self.frames[-1]
+
+    def made_of(self, kind: type[Frame]) -> "Film":
+        """In frames of another kind: the kind's own methods come before those of `Flat`."""
+        made = Flat if kind is Frame else type(kind.__name__, (kind, Flat), {})
+        return Film(tuple(made(each.cells, each.n, each.t) for each in self.frames))
+
+
+def film() -> Film:
+    """The room."""
+    of: Any = seen()
+    return Film((Flat(of, of.n, 0), Flat(of, of.n, 1)))
+
+
+def in_disk(of: Image, index: Array, X: Reservoirs, chance: Chance) -> Sequence[Pixels]:
+    """One neighbour, within RADIUS pixels."""
+    return random_in_disk((SIDE, SIDE))(of, index, 1, RADIUS, chance)
+
+
+def loop_of(parts: Parts) -> Loop:
+    """A loop of the zoo, right or wrong, on the film; neighbours are those of a map unless the parts choose."""
+    scene: Any = film()
+    return (replace(parts, neighbours=in_disk) if parts.neighbours is next_pixel else parts)(scene)
+
+
+def rendered(loop: Loop, at: Image) -> Array:
+    """Images of replicas, (replicas, SIDE, SIDE)."""
+    n = SIDE * SIDE
+    found = []
+    for batch in range(BATCHES):
+        here = Pixels(at, np.arange(n * REPLICAS))
+        Y = loop(here.index, Live(np.random.default_rng(batch + 1)))
+        found.append(shade(Y, here).mean(axis=0).reshape(-1, SIDE, SIDE))
+    return np.concatenate(found)
+
+
+def both(bug: Bug) -> tuple[Array, Array]:
+    """Images of the right and of the wrong loop.  Raises AttributeError for a mistake that is made of cells."""
+    right, wrong = (rendered(loop_of(parts), film().made_of(parts.here).now) for parts in (bug.right, bug.wrong))
+    return right, wrong
+
+
+# ---------------------------------------------------------------- mistakes about paths
+
+
+def reusing(of: PathIntegrals) -> Loop:
+    """New samples and two rounds with neighbours."""
+
+    def loop(index: Array, chance: Chance) -> Reservoirs:
+        here = Pixels(of, index)
+        X = initial(here, chance)
+        for _ in range(2):
+            X = spatial(X, here, in_disk(of, index, X, chance), chance)
+        return X
+
+    return loop
+
+
+def moving(rated: PathIntegrals) -> Loop:
+    """New samples and the history of a map that stood STEP pixels further to the left, rated by some integrals."""
+    now, before = seen(), seen(STEP)
+
+    def loop(index: Array, chance: Chance) -> Reservoirs:
+        Y, source = initial(Pixels(before, index), chance), index + STEP
+        source = np.where(index % SIDE + STEP < SIDE, source, NOWHERE)
+        return temporal(initial(Pixels(now, index), chance), Pixels(now, index), Y, [Pixels(rated, source)], chance)
+
+    return loop
+
+
+def scattered(of: Any) -> Any:
+    """The same integrals without the light that a ray meets at once, which hides all others in a map."""
+    if isinstance(of, PathIntegrals):
+        object.__setattr__(of, "leaves", ScatteredIntegrals(of.tracer).leaves)
+    return of
+
+
+def both_of(bug: TransportBug) -> tuple[Array, Array]:
+    """Images of the right and of the wrong renderer."""
+    if "camera" in bug.name:
+        history = scattered(bug.wrong(seen().tracer))
+        return tuple(rendered(moving(of), seen()) for of in (seen(STEP), history))  # type: ignore[return-value]
+    wrong = scattered(bug.wrong(seen().tracer))
+    right: Any = seen() if isinstance(wrong, PathIntegrals) else PathIntegrals(seen().tracer)
+    return rendered(reusing(right), right), rendered(reusing(wrong), wrong)
+
+
+# ---------------------------------------------------------------- pictures
+
+
+def beside(right: Array, wrong: Array) -> Figure:
+    """The right mean, the wrong one, and by how much they differ."""
+    truth, found = right.mean(axis=0), wrong.mean(axis=0)
+    picture = Figure(figsize=(6.6, 2.5), layout="constrained")
+    axes = list(picture.subplots(1, 3))
+    bright = np.percentile(truth, 98)
+    shown(axes[0], truth, "right", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
+    shown(axes[1], found, "with the mistake", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
+    blurred = smooth(found - truth) / np.maximum(smooth(truth), 0.1 * truth.mean())
+    far = max(0.05, float(np.percentile(abs(blurred), 99)))
+    drawn = shown(axes[2], 100 * blurred, "difference (%)", vmin=-100 * far, vmax=100 * far, cmap="RdBu_r")
+    picture.colorbar(drawn, ax=axes[2], shrink=0.85)
+    return picture
+
+
+def noise_beside(right: Array, wrong: Array) -> Figure:
+    """One frame of each, and the ratio of their standard deviations."""
+    picture = Figure(figsize=(6.6, 2.5), layout="constrained")
+    axes = list(picture.subplots(1, 3))
+    bright = 2 * np.percentile(right.mean(axis=0), 98)
+    shown(axes[0], right[0], "right, one image", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
+    shown(axes[1], wrong[0], "with it, one image", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
+    lit = right.mean(axis=0) > 0.05 * right.mean()
+    ratios = np.where(lit, smooth(wrong.std(axis=0)) / np.maximum(smooth(right.std(axis=0)), 1e-9), 1)
+    far = max(0.1, float(np.percentile(abs(np.log2(ratios)), 98)))
+    drawn = shown(axes[2], np.log2(ratios), "noise (log2 of the ratio)", vmin=-far, vmax=far, cmap="PuOr_r")
+    picture.colorbar(drawn, ax=axes[2], shrink=0.85)
+    return picture
+
+
+def shown(ax: Axes, image: Array, title: str, **look: Any) -> Any:
+    """An image of the room with its walls."""
+    (x, y), (X, Y) = room().low, room().high
+    drawn = ax.imshow(image, origin="lower", extent=(x, X, y, Y), interpolation="nearest", **look)
+    outline(ax, room().scene, color="k", lw=1, ls="-")
+    ax.set(xlim=(x, X), ylim=(y, Y), title=title)
+    ax.set_axis_off()
+    return drawn
+
+
+def smooth(image: Array) -> Array:
+    """Means over 3 x 3 pixels, mirrored at the borders."""
+    padded = np.pad(image, 1, mode="edge")
+    rows = padded[:-2] + padded[1:-1] + padded[2:]
+    return np.asarray((rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]) / 9)
+
+
+def exact(bug: Bug) -> Figure:
+    """The exact bias of every cell of the mistake's own scene, pixel by pixel."""
+    scene = bug.scene()
+    bias = 100 * exact_bias(bug.wrong(scene), scene)
+    picture = Figure(figsize=(6.6, 2.2), layout="constrained")
+    axes = np.atleast_1d(picture.subplots(1, len(bias), sharey=True))
+    for k, (ax, of_pixel) in enumerate(zip(axes, bias, strict=True)):
+        ax.bar(np.arange(len(of_pixel)), of_pixel, color=[style.COLOURS[3 * (b > 0)] for b in of_pixel])
+        ax.axhline(0, color="k", lw=0.8)
+        ax.set(xlabel="cell", title=f"pixel {k}")
+    axes[0].set_ylabel("bias (%)")
+    return picture
+
+
+def picture_of(name: str) -> tuple[Figure, str]:
+    """A mistake's picture, and its kind: "planted" or "exact"."""
+    if name in TRANSPORT_BUGS:
+        return beside(*both_of(TRANSPORT_BUGS[name])), "planted"
+    bug = {**BUGS, **INEFFICIENT}[name]
+    try:
+        images = both(bug)
+    except (AttributeError, TypeError, IndexError):
+        return exact(bug), "exact"
+    return (beside if name in BUGS else noise_beside)(*images), "planted"
+
+
+def main() -> None:
+    """Draw the pictures of all mistakes, or of those whose names contain the words given."""
+    parser = argparse.ArgumentParser(prog="python -m docs.site.planted", description=main.__doc__)
+    parser.add_argument("words", nargs="*", help="parts of names; none for all")
+    words = parser.parse_args().words
+    FOLDER.mkdir(exist_ok=True)
+    for name in (*BUGS, *INEFFICIENT, *TRANSPORT_BUGS):
+        if words and not any(word in name for word in words):
+            continue
+        with style.context():
+            picture, kind = picture_of(name)
+            write(picture, FOLDER / f"{slug(name)}.png")
+        print(f"{kind}: {name}", flush=True)
+
+
+def write(picture: Figure, file: Path) -> None:
+    """A small file: 64 colours."""
+    raw = io.BytesIO()
+    picture.savefig(raw, dpi=90, format="png", metadata={"Software": None})
+    few = Raster.open(raw).convert("RGB").quantize(64, Raster.Quantize.MAXCOVERAGE, dither=Raster.Dither.NONE)
+    few.save(file, format="png", optimize=True)
+
+
+if __name__ == "__main__":
+    main()
