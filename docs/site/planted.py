@@ -20,13 +20,14 @@ from PIL import Image as Raster
 
 from docs.site.symptoms import slug
 from figures.report import style
-from flatland2d import setting
+from flatland2d import scenes, setting
 from flatland2d.pictures import outline
 from flatland2d.scenes import Setting
+from flatland2d.space import PLANE
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.images import random_in_disk
-from restir_ref.integrals import NOWHERE, Image, Pixels, Reservoirs, Shifted
+from restir_ref.integrals import Image, Pixels, Reservoirs, Shifted
 from restir_ref.oracle.cells import Frame
 from restir_ref.oracle.scenes import Loop, Parts, next_pixel
 from restir_ref.oracle.zoo import BUGS, INEFFICIENT, Bug, exact_bias
@@ -35,6 +36,7 @@ from restir_ref.transport.paths import Connectability, Tracer
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.proofs.zoo.bug import TransportBug
 from restir_ref.transport.restir_pt import PathIntegrals, ScatteredIntegrals
+from restir_ref.transport.scene import Scene, scene
 
 FOLDER = Path(__file__).resolve().parents[1] / "symptoms"
 SIDE, RADIUS, DEPTH, RULE = 40, 5, 2, Connectability(roughness=0.2, distance=0.02)
@@ -44,8 +46,8 @@ REPLICAS, BATCHES = 60, 4
 EXPOSURE = 1 / 3
 """Brings targets near 1, where thresholds of the zoo are meant to be."""
 
-STEP = 4
-"""Pixels by which the map moves between two frames, for the mistake that is about motion."""
+STEP = 0.15
+"""How far the right box moves between two frames, for the mistake that is about motion."""
 
 
 @cache
@@ -54,12 +56,17 @@ def room() -> Setting:
     return setting("cornell")
 
 
+def standing(step: float) -> Scene:
+    """The same room with the right box so far to the left."""
+    boxes = scenes.boxes(1)
+    left, right = boxes[:4], [replace(each, corners=[(x - step, y) for x, y in each.corners]) for each in boxes[4:]]
+    facets = [*scenes.room(0), *left, *right, *scenes.chain(scenes.LAMP, 0, 8.0)]
+    return scene(PLANE, [scenes.mixed(0.5, 0.5, 0.2), scenes.mixed(0.3, 0.5, 0.5)], facets)
+
+
 def seen(step: float = 0) -> ScatteredIntegrals:
-    """Its fluence, SIDE x SIDE pixels, moved by so many pixels to the left."""
-    sensor = room().fluence(SIDE, SIDE)
-    by = step * (sensor.high[0] - sensor.low[0]) / SIDE
-    (x, y), (X, Y) = sensor.low, sensor.high
-    return ScatteredIntegrals(Tracer(room().scene, replace(sensor, low=(x - by, y), high=(X - by, Y)), DEPTH, RULE))
+    """Its fluence, SIDE x SIDE pixels, with the right box so far to the left."""
+    return ScatteredIntegrals(Tracer(standing(step), room().fluence(SIDE, SIDE), DEPTH, RULE))
 
 
 # ---------------------------------------------------------------- loops of the zoo in flatland
@@ -160,13 +167,12 @@ def reusing(of: PathIntegrals) -> Loop:
 
 
 def moving(rated: PathIntegrals) -> Loop:
-    """New samples and the history of a map that stood STEP pixels further to the left, rated by some integrals."""
+    """New samples and the history of a frame in which the right box stood elsewhere, rated by some integrals."""
     now, before = seen(), seen(STEP)
 
     def loop(index: Array, chance: Chance) -> Reservoirs:
-        Y, source = initial(Pixels(before, index), chance), index + STEP
-        source = np.where(index % SIDE + STEP < SIDE, source, NOWHERE)
-        return temporal(initial(Pixels(now, index), chance), Pixels(now, index), Y, [Pixels(rated, source)], chance)
+        here, Y = Pixels(now, index), initial(Pixels(before, index), chance)
+        return temporal(initial(here, chance), here, Y, [Pixels(rated, index)], chance)
 
     return loop
 

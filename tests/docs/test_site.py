@@ -186,6 +186,12 @@ def test_a_mistake_in_a_shift_is_planted_above_the_shift_of_paths(monkeypatch) -
     assert len(set(J)) > 2
 
 
+def test_the_room_whose_box_moves_is_the_same_room_where_it_stands() -> None:
+    now, before = planted.room().scene.corners, planted.standing(planted.STEP).corners
+    assert (planted.standing(0).corners == now).all()
+    assert (before != now).any(axis=(0, 1)).sum() == 4
+
+
 def test_a_mistake_that_is_made_of_cells_has_the_exact_picture_of_its_scene(monkeypatch) -> None:
     few(monkeypatch)
     assert planted.picture_of("two-to-one shift")[1] == "exact"
