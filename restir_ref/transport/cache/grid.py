@@ -74,9 +74,9 @@ class Grid:
             yield np.asarray(probe), np.where(up, part, 1 - part).prod(axis=0)
 
     def to_boundary(self, w: Array) -> Array:
-        """Distance from a probe, along w (d, N), to the boundary of its own cell, half a spacing away; (N,)."""
+        """Distance from a probe, along w (d, N), to the boundary of its box, a spacing away: there it has no weight."""
         size = np.maximum(np.abs(w), np.finfo(float).tiny)
-        return np.asarray((_column(self.spacing) / 2 / size).min(axis=0))
+        return np.asarray((_column(self.spacing) / size).min(axis=0))
 
 
 def over(low: Sequence[float], high: Sequence[float], counts: Sequence[int]) -> Grid:

@@ -153,10 +153,11 @@ def _probes(v: Volume, s: Scene, how: Updating, rays: _Rays, chance: Chance) -> 
 
 
 def behind(grid: Grid, maps: Directions, r1: Array, w: Array) -> Array:
-    """db = min(r1(-w), way to the boundary of the cell): how much further than the probe the lit surface is, (n, R).
+    """db = min(r1(-w), way to the probe's boundary): how much further than the probe the lit surface is; (n, R).
 
     r1 (n, K') mean distances of probes, w (d, R) directions to the light.  So (d / (d + s db))^(dim - 1) attenuates
     what is emitted at distance d; the user's s is 1 unless scenes come out too dark.  [DDGIR 3.2]
+    Ours: the paper does not say where a probe's boundary is; here its box reaches as far as its interpolation weight.
     """
     index, weight = maps.fetch(-w)
     n, R = len(r1), w.shape[-1]
