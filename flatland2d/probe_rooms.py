@@ -1,4 +1,4 @@
-"""Flatland scenes for volumes of probes, each with what makes it hard or easy for them, and grids of probes for a scene.
+"""Flatland scenes for volumes of probes, each with what makes it hard or easy for them, and grids of probes.
 
 Lengths are in units of a room's height, as in `scenes`.
 """

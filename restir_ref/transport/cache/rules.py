@@ -21,10 +21,10 @@ class Rule:
     scattered: float
 
 
-ORIGINAL = Rule(emitted=0.0, scattered=1.0)
+ORIGINAL = Rule(emitted=0, scattered=1)
 """E = int (L_DDGI + T_fd L_e)(h(x, w), -w) <n, w> dw; fixed point sum over i >= 2 of T_fd^i L_e.  [DDGIR Eq. 4]"""
 
-AUGMENTED = Rule(emitted=1.0, scattered=0.0)
+AUGMENTED = Rule(emitted=1, scattered=0)
 """E+ = int (L+ + L_e)(h(x, w), -w) <n, w> dw; fixed point T_f L, all light that is scattered.  [DDGIR Eq. 5]"""
 
 RULES: Mapping[str, Rule] = MappingProxyType({"original": ORIGINAL, "augmented": AUGMENTED})

@@ -59,7 +59,7 @@ def load(path: Path, s: Scene, maps: Maps, weighting: Weighting | None = None) -
     Raises ValueError for a file that is no volume, one of another scene, or one with other maps.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             told = json.loads(str(file["told"]))
             E, r, active = file["E"], file["r"], file["active"]
             of, grid, frames = (
