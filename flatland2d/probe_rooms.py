@@ -23,10 +23,13 @@ def probes(setting: Setting, per_unit: float = PER_UNIT) -> Grid:
     return over(setting.low, setting.high, counts)
 
 
-def sunlit() -> Setting:
-    """FS11: a dim room whose outer walls are one facet thick, a strong sun outside: probes beyond the wall leak."""
+def sunlit(lamp: float = 1.0) -> Setting:
+    """FS11: a dim room whose outer walls are one facet thick, a strong sun outside: probes beyond the wall leak.
+
+    Without its `lamp`, all light in the room has leaked.
+    """
     sun = chain([(-0.5, 1.2), (-0.5, -0.2)], 0, 40.0)
-    facets = [*room(0), *chain(LAMP, 0, 1.0), *sun]
+    facets = [*room(0), *chain(LAMP, 0, lamp), *sun]
     return Setting(
         scene(PLANE, [matte(0.75)], facets), (0.8, 0.5), (0.0, 0.4), crop=896, low=(-0.25, -0.25), high=(1.25, 1.25)
     )

@@ -119,7 +119,7 @@ def unlit(scene: Scene, grid: Grid, maps: Maps) -> Volume:
     Raises ValueError for a grid or maps of another dimension than the scene's, and where every probe is inside a wall.
     """
     d = scene.space.d
-    if not grid.d == len(maps.irradiance.centres()) == len(maps.depth.centres()) == d:
+    if len({d, grid.d, len(maps.irradiance.centres()), len(maps.depth.centres())}) > 1:
         raise ValueError(
             f"the scene has {d} dimensions, the grid {grid.d}, the maps {len(maps.irradiance.centres())} and "
             f"{len(maps.depth.centres())}: take a grid of {d} axes, and the maps of the scene's own world."

@@ -71,9 +71,9 @@ def scattered_share(s, cos):
     return np.array(found)
 
 
-def kept(world, name, times=10):
+def kept(world, name):
     """E / C_d of a probe in a furnace of radiance 1, less what is emitted; its mean over texels and frames."""
-    s = furnished(world, name)
+    s, times = furnished(world, name), 80 if name == "ggx" else 10
     v = volume(world, s)
     v = replace(v, E=v.E + ball_volume(v.grid.d))
     how = Updating(one_lobe, rays=200, hysteresis=0.0, attenuation=0.0)

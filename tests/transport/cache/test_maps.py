@@ -90,7 +90,7 @@ def test_folding_undoes_unfolding():
 
 @pytest.mark.parametrize("name", WORLDS)
 def test_what_is_gathered_are_shares_of_rays(name):
-    space, maps = WORLDS[name]
+    _, maps = WORLDS[name]
     for part, exponent in ((maps.irradiance, 1), (maps.depth, 50)):
         shares, known = gathering(part, maps.rays(200, live(9)), exponent)
         assert known.all()

@@ -186,7 +186,7 @@ HEIGHT, PROBE, SMALL = 0.5, 0.2, 0.05
 
 
 def under_a_lamp(name, size):
-    """A floor through 0, and a lamp that faces it along an axis (d, 1), the centre of a texel: the scene and the axis."""
+    """A floor through 0, and a lamp that faces it along an axis (d, 1), a texel's centre: the scene and the axis."""
     space, maps = WORLDS[name]
     d, axis = space.d, maps.irradiance.centres()[:, :1]
 

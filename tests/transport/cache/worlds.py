@@ -1,4 +1,4 @@
-"""Worlds to test volumes in: those that there are, and d = 4, whose directions are divided here, apart from any world."""
+"""Worlds to test volumes in: those that there are, and d = 4, whose directions are divided here."""
 
 from dataclasses import dataclass
 
