@@ -5,7 +5,7 @@ it sees.  A query blends the probes around a point: by distance, by whether they
 whether they see it, which the moments tell with Chebyshev's inequality.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -97,11 +97,15 @@ class Volume:
         """
         texels = self.maps.irradiance.fetch(w)
         E, whole = np.zeros((self.C, x.shape[-1])), np.zeros(x.shape[-1])
-        for probe, near in self.grid.corners(x + b):
-            weight = near * self.trust(probe, x, n, b)
+        for probe, weight in self.heard(x, n, b):
             E += weight * fetched(self.E, probe, *texels)
             whole += weight
         return ratio(E, whole)
+
+    def heard(self, x: Array, n: Array, b: Array) -> Iterator[tuple[Array, Array]]:
+        """The 2^d probes around x + b, and their weights before they are normalised; (N,) each."""
+        for probe, near in self.grid.corners(x + b):
+            yield probe, near * self.trust(probe, x, n, b)
 
     def trust(self, probe: Array, x: Array, n: Array, b: Array) -> Array:
         """crush(wrap visibility) of one probe for each query, 0 of those that do not take part; (N,)."""
