@@ -43,7 +43,7 @@ def volume_picture(ax: "Axes", setting: Setting, v: Volume) -> None:
     E = v.E.mean(axis=0)
     size = SHOWN * min(v.grid.spacing) * ratio(E, E.max())
     shapes = around(v, np.flatnonzero(v.active), size, v.maps.irradiance.centres())
-    ax.add_collection(PolyCollection(shapes, facecolors=LIGHT, edgecolors="k", linewidths=0.4, label="irradiance"))
+    ax.add_collection(PolyCollection(list(shapes), facecolors=LIGHT, edgecolors="k", linewidths=0.4, label="irradiance"))
     _places(ax, v)
     outline(ax, setting.scene)
     lights(ax, setting.scene)
@@ -77,7 +77,7 @@ def depth_picture(ax: "Axes", setting: Setting, v: Volume, probe: Sequence[int])
 
 def around(v: Volume, probe: Array, size: Array, directions: Array) -> Array:
     """Corners (n, K, 2) around probes (n,), at distances size (P, K) in directions (2, K)."""
-    return v.grid.place(probe).T[:, None] + size[probe][..., None] * directions.T
+    return np.asarray(v.grid.place(probe).T[:, None] + size[probe][..., None] * directions.T)
 
 
 def leaks(v: Volume, setting: Setting, count: int = 720) -> tuple[Array, Array]:
