@@ -43,7 +43,9 @@ def volume_picture(ax: "Axes", setting: Setting, v: Volume) -> None:
     E = v.E.mean(axis=0)
     size = SHOWN * min(v.grid.spacing) * ratio(E, E.max())
     shapes = around(v, np.flatnonzero(v.active), size, v.maps.irradiance.centres())
-    ax.add_collection(PolyCollection(list(shapes), facecolors=LIGHT, edgecolors="k", linewidths=0.4, label="irradiance"))
+    ax.add_collection(
+        PolyCollection(list(shapes), facecolors=LIGHT, edgecolors="k", linewidths=0.4, label="irradiance")
+    )
     _places(ax, v)
     outline(ax, setting.scene)
     lights(ax, setting.scene)

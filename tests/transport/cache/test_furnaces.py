@@ -91,8 +91,8 @@ def expected(world, name):
     x = np.repeat(v.grid.place(np.arange(v.grid.P)), 2000, axis=1)
     w = np.tile(v.maps.rays(2000, live(3)), v.grid.P)
     cos = arrive(s, x, w)[0].o[-1]
-    at = 0.5 + 0.5 * np.cos((np.arange(12) + 0.5) / 12 * np.pi)
-    return np.polynomial.Chebyshev.fit(at, scattered_share(s, at), 8, [0, 1])(cos).mean()
+    at = 0.5 + 0.5 * np.cos((np.arange(20) + 0.5) / 20 * np.pi)
+    return np.polynomial.Chebyshev.fit(at, scattered_share(s, at), 16, [0, 1])(cos).mean()
 
 
 @pytest.mark.claims("DDGIR-E06", part="what a volume keeps", world="flatland2d")
