@@ -66,19 +66,19 @@ def truth(make: Callable[[], Setting], per_segment: int = 20) -> Truth:
 
 
 def relative_bias(v: Volume, t: Truth, B: Array) -> float:
-    """Mean E at every seventh probe in all its directions, over that from panels of radiance B, less 1."""
+    """Mean E at some forty probes in all their directions, over that from panels of radiance B, less 1."""
     n = v.maps.irradiance.centres()
-    probe = np.flatnonzero(v.active)[::7]
+    probe = np.flatnonzero(v.active)[:: max(v.grid.P // 40, 5)]
     x, w = np.repeat(v.grid.place(probe), n.shape[1], axis=1), np.tile(n, len(probe))
     return float(v.irradiance(x, w, w, 0 * x)[0].mean() / t.irradiance(x, w, B).mean() - 1)
 
 
 @pytest.mark.claims("DDGIR-A01", part="all light, by radiosity")
 def test_probes_are_too_bright_by_a_share_that_falls_with_their_spacing():
-    """E at probes: +7 % at 8 per unit, +3.4 % at 16, for light bounces off what a probe before the wall knows."""
+    """E at probes: +6.3 % at 8 per unit, +3.0 % at 16, +1.2 % at 48: light bounces off what probes before walls know."""
     t = truth(open_room)
     biases = [relative_bias(light(open_room(), each), t, t.B) for each in (8, 16)]
-    assert 0.05 < biases[0] < 0.09
+    assert 0.05 < biases[0] < 0.08
     assert 0.02 < biases[1] < 0.6 * biases[0]
 
 
@@ -87,6 +87,13 @@ def test_original_probes_lack_the_light_that_comes_directly():
     v, t = light(open_room(), 8, replace(PLAIN, rule=ORIGINAL), 0.02), truth(open_room)
     assert abs(relative_bias(v, t, t.B - t.p.emission)) < 0.03
     assert relative_bias(v, t, t.B) < -0.3
+
+
+@pytest.mark.claims("DDGIR-E04", part="dense probes")
+def test_original_probes_are_right_within_a_percent():
+    """16 per unit; augmented ones need more than 48 per unit for that."""
+    v, t = light(open_room(), 16, replace(PLAIN, rule=ORIGINAL)), truth(open_room)
+    assert abs(relative_bias(v, t, t.B - t.p.emission)) < 0.01
 
 
 @pytest.mark.claims("DDGIR-E04", part="exact probes")
