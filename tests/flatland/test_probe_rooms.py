@@ -75,7 +75,7 @@ def relative_bias(v: Volume, t: Truth, B: Array) -> float:
 
 @pytest.mark.claims("DDGIR-A01", part="all light, by radiosity")
 def test_probes_are_too_bright_by_a_share_that_falls_with_their_spacing():
-    """E at probes: +6.3 % at 8 per unit, +3.0 % at 16, +1.2 % at 48: light bounces off what probes before walls know."""
+    """+6.3 % at 8 per unit, +3.0 % at 16, +1.2 % at 48: light bounces off what probes before walls know."""
     t = truth(open_room)
     biases = [relative_bias(light(open_room(), each), t, t.B) for each in (8, 16)]
     assert 0.05 < biases[0] < 0.08
