@@ -10,6 +10,7 @@ from pathlib import Path
 
 from flatland2d.space import PLANE
 from restir_ref.transport.materials import Layer, Material
+from restir_ref.transport.paths import Connectability
 from restir_ref.transport.proofs.golden.make import main
 from restir_ref.transport.proofs.golden.sketch import Sketch
 from restir_ref.transport.scene import Ball, Facet
@@ -17,7 +18,7 @@ from restir_ref.transport.scene import Ball, Facet
 SHIPPED = Path(__file__).parent / "data" / "golden_paths.json"
 
 WHITE = Material([Layer("lambert", (0.75,))])
-MIXED = Material([Layer("lambert", (0.5,), weight=0.5), Layer("ggx", (0.375,), 0.5, weight=0.25)])
+MIXED = Material([Layer("lambert", (0.5,), weight=0.5), Layer("ggx", (0.375,), 0.375, weight=0.25)])
 SHINY = Material([Layer("lambert", (0.25,), weight=0.5), Layer("ggx", (0.75,), 0.125, weight=1.0)])
 MIRROR = Material([Layer("mirror", (0.875,))])
 
@@ -37,10 +38,11 @@ EYES = [((0.5, 0.25), (0.25 + k / 16, 0.0)) for k in range(6)]
 SKETCHES = (
     Sketch(
         "matte",
-        "a room with two lamps and a screen; every vertex can be connected to",
+        "a room with two lamps and a screen; vertices connect from a quarter of the room on, and one pixel sees a lamp",
         [WHITE, WHITE, WHITE],
         ROOM + LAMPS + SCREEN,
-        EYES,
+        [*EYES[:5], ((0.5, 0.25), (0.625, 0.9375))],
+        rule=Connectability(0.1875, 0.25),
     ),
     Sketch(
         "glossy",

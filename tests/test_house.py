@@ -23,14 +23,15 @@ PAPERS = ("figures.gris", "figures.gradient", "figures.mcmc", "figures.ddgi", "f
 CLAIMS, ENGINE, REPORT, SHARED = "figures.claims", "figures.engine", "figures.report", "figures.experiments"
 STORE, STYLE = "figures.engine.store", "figures.report.style"
 """What of the engine reference images need, and what of the report a figure's `draw` needs."""
-BASELINES, PROOFS = f"{TRANSPORT}.baselines", f"{TRANSPORT}.proofs"
-BELOW = {THEORY, TRANSPORT, BASELINES, PROOFS, *WORLDS}
+BASELINES, CACHE, PROOFS = f"{TRANSPORT}.baselines", f"{TRANSPORT}.cache", f"{TRANSPORT}.proofs"
+BELOW = {THEORY, TRANSPORT, BASELINES, CACHE, PROOFS, *WORLDS}
 MAY_IMPORT = {
     THEORY: {THEORY},
     TRANSPORT: {THEORY, TRANSPORT},
-    BASELINES: {THEORY, TRANSPORT, BASELINES},
+    BASELINES: {THEORY, TRANSPORT, BASELINES, CACHE},
+    CACHE: {THEORY, TRANSPORT, CACHE},
     PROOFS: {THEORY, TRANSPORT, PROOFS},
-    **{world: {THEORY, TRANSPORT, BASELINES, PROOFS, world} for world in WORLDS},
+    **{world: {THEORY, TRANSPORT, BASELINES, CACHE, PROOFS, world} for world in WORLDS},
     CLAIMS: {THEORY, CLAIMS},
     STORE: {CLAIMS, ENGINE},
     ENGINE: {CLAIMS, ENGINE, STORE},
@@ -106,6 +107,10 @@ UPWARD = {
     "theory to transport": ("restir_ref/mis.py", "from . import transport"),
     "oracle to transport": ("restir_ref/oracle/audit.py", "from ..transport.paths import trace"),
     "renderer to baseline": ("restir_ref/transport/paths.py", "from restir_ref.transport.baselines import restir_gi"),
+    "renderer to cache": ("restir_ref/transport/paths.py", "from .cache.field import Field"),
+    "cache to baseline": ("restir_ref/transport/cache/update.py", "from ..baselines import restir_di"),
+    "cache to proof": ("restir_ref/transport/cache/update.py", "from ..proofs import reading"),
+    "cache to world": ("restir_ref/transport/cache/maps.py", "from flatland2d.directions import Bins"),
     "renderer to proof": ("restir_ref/transport/restir_pt.py", "from .proofs.judge import judge"),
     "baseline to proof": ("restir_ref/transport/baselines/restir_gi.py", "from ..proofs import reading"),
     "proof to baseline": ("restir_ref/transport/proofs/judge.py", "from ..baselines import restir_di"),

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from restir_ref.transport.materials import Layer, Material
+from restir_ref.transport.paths import Connectability
 from restir_ref.transport.proofs.golden.make import main
 from restir_ref.transport.proofs.golden.sketch import Sketch
 from restir_ref.transport.scene import Ball, Facet
@@ -20,7 +21,7 @@ SHIPPED = Path(__file__).parent / "data" / "golden_paths.json"
 WHITE = Material([Layer("lambert", (0.75, 0.75, 0.75))])
 RED = Material([Layer("lambert", (0.625, 0.125, 0.125))])
 MIXED = Material(
-    [Layer("lambert", (0.125, 0.5, 0.25), weight=0.5), Layer("ggx", (0.375, 0.375, 0.375), 0.5, weight=0.25)]
+    [Layer("lambert", (0.125, 0.5, 0.25), weight=0.5), Layer("ggx", (0.375, 0.375, 0.375), 0.375, weight=0.25)]
 )
 SHINY = Material(
     [Layer("lambert", (0.25, 0.25, 0.25), weight=0.5), Layer("ggx", (0.75, 0.625, 0.5), 0.125, weight=1.0)]
@@ -64,10 +65,11 @@ EYES = [((0.5, 0.125, 0.5), (0.25 + k % 3 / 8, 0.5 + k // 3 / 8, 0.0)) for k in 
 SKETCHES = (
     Sketch(
         "matte",
-        "a room with two lamps and a screen; every vertex can be connected to",
+        "a room with two lamps and a screen; vertices connect from a quarter of the room on, and one pixel sees a lamp",
         [WHITE, RED, WHITE],
         room(2) + LAMPS + SCREEN,
-        EYES,
+        [*EYES[:5], ((0.5, 0.125, 0.5), (0.375, 0.5, 0.9375))],
+        rule=Connectability(0.1875, 0.25),
     ),
     Sketch(
         "glossy",

@@ -460,7 +460,8 @@ class Reader:
             if not joined:
                 return new, self.real(0)
             new = joined
-            ratio = self.A(new, c + 1, leaf) / self.A(path, c + 1, leaf)
+            onward = self.A(new, c + 1, leaf)
+            ratio = onward / self.A(path, c + 1, leaf) if onward else onward
         elif leaf.nee:
             new[-1] = self.sample_light(new[-1])
         return new, ratio if self.connect(new, c - 1, leaf) else self.real(0)

@@ -235,7 +235,7 @@ MISTAKES = {
     "distance to the power d": (jacobian(lambda r, x: x.o[-1] / x.r**r.d), "3d glossy", "shifts.record.A"),
     "p_out left out of J": (in_A(lambda r, *x: 1 / p_out(r, *x)), "3d glossy", "shifts.record.A"),
     "p_out of all lobes in J": (in_A(p_out_by_all_lobes), "3d glossy", "shifts.record.A"),
-    "joined through walls": (but(join=through_walls), "3d matte", "shifts.defined"),
+    "joined through walls": (but(join=through_walls), "2d matte", "shifts.defined"),
     "joined by the lobe of the replay": (but(join=lobe_of_the_replay), "2d mirror ball", "shifts.defined"),
     "x_c not evaluated again": (but(join=as_it_was), "3d mirror ball", "shifts.J"),
     "Talbot MIS": (but(m=talbot), "3d glossy", "pass.w"),

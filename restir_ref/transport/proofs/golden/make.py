@@ -25,7 +25,7 @@ from restir_ref.transport.proofs.golden.terms import (
     turned,
 )
 from restir_ref.transport.rays import arrive
-from restir_ref.transport.shifts import replay
+from restir_ref.transport.shifts import replay, shift_path
 from restir_ref.transport.space import Space
 from restir_ref.transport.vectors import dot
 
@@ -35,7 +35,7 @@ SEED = 20220701
 POOL = 4096
 """Candidates of which a file keeps those far from boundaries."""
 
-PATHS, SHIFTS, PASSES = 12, 24, 12
+PATHS, SHIFTS, PASSES = 12, 32, 12
 """How many of them it keeps, of each scene."""
 
 MARGIN = 2.0**-8
@@ -47,7 +47,7 @@ GRAIN = 2.0**-16
 UNIT = {"float32": 2.0**-24, "float64": 2.0**-53}
 """Relative error of one operation."""
 
-OPERATIONS = 64
+OPERATIONS = 128
 """So many roundings of inputs and results are allowed for."""
 
 
@@ -96,7 +96,7 @@ def choose(t: Tracer, chance: Chance) -> Chosen:
     every = every_shift(t, u, pixel)
     clear = np.flatnonzero(margin_of_shifts(t, every) > MARGIN)
     spread = clear[np.argsort(clear * 0.618034 % 1, kind="stable")]  # over paths, leaves and pixels
-    some = mixed(spread, every.nee[spread] == 0, SHIFTS)
+    some = by_turns([spread[sort[spread]] for sort in sorts(t, every)], SHIFTS)
     shifts = every.shifted(some, every.to[some])
     return replace(shifts, passes=clear_passes(t, shifts), mutated=clear_mutations(t, shifts))
 
@@ -105,6 +105,23 @@ def mixed(columns: Array, rare: Array, count: int) -> Array:
     """`count` of the columns, half of them rare ones as far as there are so many, in their order."""
     first = columns[rare][: count // 2]
     return np.concatenate([first, columns[~rare][: count - len(first)]])
+
+
+def sorts(t: Tracer, s: Chosen) -> list[Array]:
+    """Masks of what shifts can be, rare ones first: connected too early (c = 0, c > 0), blocked, onto a light; all."""
+    x = records(t, s)
+    _, J = shift_path(t, x, s.to)
+    early = ~replay(t, x, s.to).legal
+    undefined = J == 0
+    return [early & (x.c == 0), early & (x.c > 0), undefined & ~early, ~undefined & (s.nee == 0), ~undefined]
+
+
+def by_turns(lists: Sequence[Array], count: int) -> Array:
+    """`count` different columns, one of each list after the other while they last."""
+    ranked = sorted(
+        (place, turn, column) for turn, each in enumerate(lists) for place, column in enumerate(each.tolist())
+    )
+    return np.array(list(dict.fromkeys(column for _, _, column in ranked))[:count], dtype=int)
 
 
 def every_shift(t: Tracer, u: Array, pixel: Array) -> Chosen:
@@ -164,8 +181,8 @@ def margin_of_shifts(t: Tracer, s: Chosen) -> Array:
     for i in range(1, t.depth + 1):
         c = np.flatnonzero(x.c == i + 1)
         joined[c] = margins.of_connections(t, take(there.x[i - 1], c), x.z[:, c], x.prim[c])
-    alive = replay(t, x, s.to).legal
-    return np.where(alive, margins.least([*found, joined]), 0)
+    lit = np.stack([T.any(axis=0) for T in there.T])  # beyond, columns are not the path's own
+    return np.where(entry(lit, last - 1), margins.least([*found, joined]), 0)
 
 
 # ---------------------------------------------------------------- tolerances
