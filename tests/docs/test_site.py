@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from docs.site import api, check, code, evidence, gallery, layout, planted, stage, symptoms, words
+from figures.report.glossary import PAPERS
 from restir_ref import Live, Pixels, initial
 from restir_ref.oracle.zoo import BUGS, INEFFICIENT
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
@@ -66,6 +67,12 @@ def test_every_claim_and_every_figure_of_the_ledger_is_told(staged) -> None:
             assert each["verdict"] in staged[f"figures/{id_}.rst"]
 
 
+def test_a_test_that_shows_several_parts_of_a_claim_is_listed_once_with_all_of_them() -> None:
+    listed = [line for line in gallery.tests("DDGIR-E06", "claims/DDGIR.html") if "albedo" in line]
+    assert len(listed) == 1
+    assert listed[0].endswith(" (every lobe, by quadrature; flatland2d, tracer3d)")
+
+
 def test_a_figure_without_a_picture_says_what_to_run(monkeypatch) -> None:
     monkeypatch.setattr(gallery, "picture", lambda id_: None)
     page = "\n".join(gallery.page(gallery.entries()["GRIS-F07"]))
@@ -74,13 +81,14 @@ def test_a_figure_without_a_picture_says_what_to_run(monkeypatch) -> None:
 
 
 def test_every_erratum_names_what_shows_it(staged) -> None:
-    """Or that nothing does yet: the section on probes."""
-    before, _, probes = staged["errata.md"].partition("## DDGIR")
-    told = [part for part in re.split(r"^### ", before, flags=re.MULTILINE)[1:] if "*Printed*" in part]
-    assert len(told) >= 12
+    told = [part for part in re.split(r"^### ", staged["errata.md"], flags=re.MULTILINE)[1:] if "*Printed*" in part]
+    assert len(told) >= 18
     for part in told:
         assert re.search(r'<a href="(code/tests|claims)/', part), part.partition("\n")[0]
-    assert "nothing" in probes
+
+
+def test_every_paper_has_its_errata(staged) -> None:
+    assert set(re.findall("^## (.+)$", staged["errata.md"], re.MULTILINE)) == set(PAPERS) - {"COM"}
 
 
 # ---------------------------------------------------------------- words
@@ -156,11 +164,14 @@ def test_the_worst_z_is_of_rows_that_ask_for_a_small_one() -> None:
 MISTAKES = (*BUGS, *INEFFICIENT, *TRANSPORT_BUGS)
 
 
-def test_every_picture_of_a_mistake_is_small_and_on_the_page_of_symptoms() -> None:
-    page, files = symptoms.page(), {symptoms.slug(name): symptoms.file(name) for name in MISTAKES}
-    for path in (ROOT / "docs" / "symptoms").glob("*.png"):
-        assert path.stat().st_size < 60_000
-        assert f"]({files[path.stem]})" in page
+def test_every_mistake_of_the_zoo_has_a_small_picture_on_the_page_of_symptoms() -> None:
+    page, folder = symptoms.page(), ROOT / "docs" / "symptoms"
+    wanted = {symptoms.slug(name): symptoms.file(name) for name in MISTAKES}
+    assert len(wanted) == len(MISTAKES)
+    assert {file.stem for file in folder.iterdir()} == wanted.keys()
+    for name, file in wanted.items():
+        assert (folder / f"{name}.png").stat().st_size < 60_000
+        assert page.count(f"]({file})") == 1, name
 
 
 def few(monkeypatch) -> None:
