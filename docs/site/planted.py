@@ -47,9 +47,6 @@ REPLICAS, BATCHES = 60, 4
 EXPOSURE = 1 / 3
 """Brings targets near 1, where thresholds of the zoo are meant to be."""
 
-ROUGH, GLOSSY = 0.5, 0.15
-"""Roughness of the boxes; for mistakes about paths they are too smooth to connect to, and paths one bounce longer."""
-
 STEP = 0.15
 """How far the right box moves between two frames, for the mistake that is about motion."""
 
@@ -60,17 +57,17 @@ def room() -> Setting:
     return setting("cornell")
 
 
-def standing(step: float, roughness: float = ROUGH) -> Scene:
-    """The same room with the right box so far to the left, and boxes of that roughness."""
+def standing(step: float) -> Scene:
+    """The same room with the right box so far to the left."""
     boxes = scenes.boxes(1)
     left, right = boxes[:4], [replace(each, corners=[(x - step, y) for x, y in each.corners]) for each in boxes[4:]]
     facets = [*scenes.room(0), *left, *right, *scenes.chain(scenes.LAMP, 0, 8.0)]
-    return scene(PLANE, [scenes.mixed(0.5, 0.5, 0.2), scenes.mixed(0.3, roughness, 0.5)], facets)
+    return scene(PLANE, [scenes.mixed(0.5, 0.5, 0.2), scenes.mixed(0.3, 0.5, 0.5)], facets)
 
 
-def seen(step: float = 0, roughness: float = ROUGH, depth: int = DEPTH) -> ScatteredIntegrals:
+def seen(step: float = 0) -> ScatteredIntegrals:
     """Its fluence, SIDE x SIDE pixels."""
-    return ScatteredIntegrals(Tracer(standing(step, roughness), room().fluence(SIDE, SIDE), depth, RULE))
+    return ScatteredIntegrals(Tracer(standing(step), room().fluence(SIDE, SIDE), DEPTH, RULE))
 
 
 # ---------------------------------------------------------------- loops of the zoo in flatland
@@ -193,7 +190,7 @@ def both_of(bug: TransportBug) -> tuple[Array, Array]:
     if "camera" in bug.name:
         history = scattered(bug.wrong(seen().tracer))
         return tuple(rendered(moving(of), seen()) for of in (seen(STEP), history))  # type: ignore[return-value]
-    of = seen(roughness=GLOSSY, depth=DEPTH + 1)
+    of = seen()
     wrong = scattered(bug.wrong(of.tracer))
     right: Any = of if isinstance(wrong, PathIntegrals) else PathIntegrals(of.tracer)
     return rendered(reusing(right), right), rendered(reusing(wrong), wrong)
@@ -210,9 +207,10 @@ def beside(right: Array, wrong: Array) -> Figure:
     bright = np.percentile(truth, 98)
     shown(axes[0], truth, "right", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
     shown(axes[1], found, "with the mistake", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
-    blurred = 100 * significant(wrong - right) / np.maximum(smooth(truth), 0.1 * truth.mean())
-    far = max(1.0, float(np.percentile(abs(blurred), 99)))
-    title = "difference (%)" if blurred.any() else "none above the noise"
+    blurred = 100 * significant(wrong - right) / np.maximum(smooth(smooth(truth)), 0.1 * truth.mean())
+    sizes = abs(blurred[blurred != 0])
+    far = max(1.0, float(np.percentile(sizes, 97))) if len(sizes) else 1.0
+    title = "difference (%)" if len(sizes) else "none above the noise"
     drawn = shown(axes[2], blurred, title, vmin=-far, vmax=far, cmap="RdBu_r")
     picture.colorbar(drawn, ax=axes[2], shrink=0.85)
     return picture
@@ -250,13 +248,13 @@ def smooth(image: Array) -> Array:
     return np.asarray((rows[..., :-2] + rows[..., 1:-1] + rows[..., 2:]) / 9)
 
 
-SURE = 4
+SURE = 3
 """Standard errors by which a difference has to be off 0 to be shown."""
 
 
 def significant(difference: Array) -> Array:
-    """The mean of differences (images, rows, columns) over images and 3 x 3 pixels, 0 where it may be noise."""
-    each = smooth(difference)
+    """The mean of differences (images, rows, columns) over images and 5 x 5 pixels, 0 where it may be noise."""
+    each = smooth(smooth(difference))
     mean, error = each.mean(axis=0), each.std(axis=0, ddof=1) / np.sqrt(len(each))
     return np.asarray(np.where(abs(mean) > SURE * error, mean, 0))
 
