@@ -245,6 +245,13 @@ def test_links_for_people_and_files_of_the_site_are_no_requests(tmp_path) -> Non
     assert check.requests(plant(tmp_path, "page.html", text)) == []
 
 
+def test_a_function_of_the_very_name_is_found_first_then_names_and_words(tmp_path) -> None:
+    objects = '{"a": [[1, 0, 1, "", "like_pairs"]], "b": [[0, 0, 1, "", "pairs"]]}'
+    text = f'Search.setIndex({{"docnames": ["b", "a", "c"], "terms": {{"pair": [0, 2]}}, "objects": {objects}}})'
+    plant(tmp_path, "searchindex.js", text)
+    assert check.searched(tmp_path, "pairs") == ["b", "a", "c"]
+
+
 @pytest.mark.parametrize("url", ["gone.html", "page.html#gone", "#gone", "x.png", "../page.html"])
 def test_a_link_into_nowhere_is_noticed(tmp_path, url) -> None:
     plant(tmp_path, "site/page.html", f'<p id="here"><a href="{url}">x</a><a href="#here">y</a>')
