@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 from benchmarks.jobs import (
     baselines,
+    deep_references,
     extremes,
     gradients,
     indirect_references,
@@ -27,6 +28,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "references": references.JOB,
         "indirect references": indirect_references.JOB,
         "space references": space_references.JOB,
+        "deep references": deep_references.JOB,
         "round trips": roundtrips.JOB,
         "re-tracing": retracing.JOB,
         "extremes": extremes.JOB,
@@ -45,6 +47,7 @@ PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType(
         "references": references.publish,
         "indirect references": indirect_references.publish,
         "space references": space_references.publish,
+        "deep references": deep_references.publish,
         "witness": witness.publish,
     }
 )
