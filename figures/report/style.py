@@ -121,6 +121,11 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
         "ReSTIR DI": Look(PURPLE, "P", LINES[6], "\\\\"),
         "reference": Look(INK, "", (0, (1, 1)), ""),
         "truth": Look(INK, "", (0, (1, 1)), ""),
+        # what asks probes
+        "primary DDGI": Look(SKY, "v", "--", "\\\\"),
+        "secondary DDGI": Look(VERMILLION, "D", ":", "xx"),
+        "resampled DDGI": Look(BLUE, "o", "-", ""),
+        "resampled as printed": Look(GREEN, "P", LINES[5], "++"),
         # MIS weights
         "talbot": TALBOT,
         "Talbot": TALBOT,
