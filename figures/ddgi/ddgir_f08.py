@@ -375,8 +375,8 @@ def draw_frames(axis: "Axes", a: Arrays) -> None:
         for x in place[~known]:
             axis.text(x, 1.2, "never", rotation=90, ha="center", va="bottom", fontsize=9)
         also = np.isfinite(cold)
-        look = {"ls": "", "marker": "_", "color": style.INK, "ms": 12}
-        axis.plot(place[also], cold[also], **look, label="cold history" if j == 0 else None)
+        label = "cold history" if j == 0 else None
+        axis.plot(place[also], cold[also], ls="", marker="_", color=style.INK, ms=12, label=label)
     axis.set_yscale("log")
     axis.set_xticks(range(len(PLACES)), list(PLACES))
     axis.set(ylabel="frames", title="To the error of one resampled frame, warm", ylim=(0.8, None))
