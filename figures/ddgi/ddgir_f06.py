@@ -1,0 +1,200 @@
+"""DDGI resampling Fig. 6: bounding the geometry term takes fireflies out of creases.
+
+Chains of frames look into the wedge of FS4, and away from it.  Fireflies come from samples that a neighbour found and
+that are very close to x_1.  Weights that count inputs (1/M) pass them on; weights that compare targets hold most of
+them back already.  The bound G_max has the unit 1 / length, here 1 / room height, and is swept.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from figures.claims import criteria
+from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
+from figures.experiments.creases import BALANCED, COUNTED, PRESETS, ROOMS, Sizes, moments, variance
+from figures.report import style
+from restir_ref.batch import Array
+from restir_ref.chance import Live
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
+
+ROOM = "FS4"
+PRINTED, OURS, NARROW = 1.0, 10.0, 100.0
+"""As printed; a tenth of a room's height, and a hundredth."""
+
+FEW = 16
+"""Samples of a pixel of which fireflies may be missing."""
+VIEWS = ("crease", "away")
+UNBOUNDED = "none"
+
+
+def bound(name: str) -> float:
+    """G_max by its name."""
+    return np.inf if name == UNBOUNDED else float(name)
+
+
+def chunks(preset: Any) -> Sequence[Any]:
+    """Both weights with all bounds, which are the arms."""
+    bounds = [f"{each:g}" for each in preset["bounds"]] + [UNBOUNDED]
+    blocks = range(preset["blocks"])
+    return [{"weights": w, "block": k, "G_max": each} for k in blocks for w in PRESETS for each in bounds]
+
+
+def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
+    """Moments of samples in both views."""
+    size, G_max = Sizes(preset["replicas"], preset["groups"], preset["frames"]), bound(chunk["G_max"])
+    views = ROOMS[preset["room"]]()
+    found = {name: moments(views[name], G_max, chunk["weights"], size, Live(rng)) for name in VIEWS}
+    return {f"{name}.{what}": array for name, each in found.items() for what, array in each.items()}
+
+
+def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
+    """Variance and high quantile of every view and arm, (replicas,) each."""
+    listed, found = chunks(preset), {"bounds": np.array(preset["bounds"])}
+    found["samples"] = np.array(preset["groups"] * preset["frames"])
+    for weights, G_max in dict.fromkeys((chunk["weights"], chunk["G_max"]) for chunk in listed):
+        mine = [r for c, r in zip(listed, results, strict=True) if (c["weights"], c["G_max"]) == (weights, G_max)]
+        for view in VIEWS:
+            joined = {each: np.concatenate([r[f"{view}.{each}"] for r in mine]) for each in ("mean", "square", "high")}
+            joined["near"] = mine[0][f"{view}.near"]
+            name = named(view, weights, G_max)
+            found |= {f"{name}.variance": variance(joined), f"{name}.high": joined["high"]}
+    return found
+
+
+def arm(a: Arrays, view: str, weights: str, G_max: float | str, what: str = "variance") -> Array:
+    """What was found of one arm, (replicas,)."""
+    name = G_max if isinstance(G_max, str) else f"{G_max:g}"
+    return a[f"{named(view, weights, name)}.{what}"]
+
+
+def named(view: str, weights: str, G_max: str) -> str:
+    """An arm in the names of arrays."""
+    return f"{view}, weights {[*PRESETS].index(weights)}, {G_max}"
+
+
+def check(a: Arrays) -> list[Claim]:
+    """Highest values and variance in the crease, and variance away from it, bounded over unbounded."""
+    return [*of_fireflies(a, (PRINTED, OURS, NARROW)), *of_weights(a)]
+
+
+def of_fireflies(a: Arrays, bounds: Sequence[float]) -> list[Claim]:
+    """Judged for two bounds and both weights; the sweep is told."""
+    return [each for weights in PRESETS for G_max in bounds for each in judged(a, weights, G_max)]
+
+
+def judged(a: Arrays, weights: str, G_max: float) -> list[Claim]:
+    """One bound."""
+
+    def pair(view: str, what: str) -> tuple[Array, Array]:
+        return arm(a, view, weights, G_max, what), arm(a, view, weights, UNBOUNDED, what)
+
+    high, spread, away = pair("crease", "high"), pair("crease", "variance"), pair("away", "variance")
+    part = f"G_max = {G_max:g}, {weights}"
+    elsewhere = Claim("DDGIR-F06", unchanged(*away), f"{part}: variance elsewhere")
+    crease = f"{part}: 99.9th percentile and variance in the crease"
+    if a["samples"] < FEW:
+        few = f"{a['samples']} samples of a pixel may have no fireflies at all."
+        return [Claim("DDGIR-F06", None, crease, reason=few), elsewhere]
+    below = criteria.all_of(criteria.ratio_below(*high, 0.5), criteria.ratio_below(*spread, 0.5))
+    above = criteria.all_of(criteria.ratio_above(*high, 1), criteria.ratio_above(*spread, 1))
+    return [Claim("DDGIR-F06", below, crease, above, reason=sweep(a, weights)), elsewhere]
+
+
+def unchanged(x: Array, y: Array) -> criteria.Outcome:
+    """x / y within 10%; or nothing was bounded at all."""
+    if np.array_equal(x, y):
+        return criteria.Outcome("the same bits: no connection is bounded", "ratio in [0.9, 1.1] at 95%", True)
+    return criteria.ratio_within(x, y, 0.9, 1.1)
+
+
+def sweep(a: Arrays, weights: str) -> str:
+    """The variance in the crease over the bound."""
+    listed = [*(f"{each:g}" for each in a["bounds"]), UNBOUNDED]
+    told = [f"{name}: {arm(a, 'crease', weights, name).mean():.3g}" for name in listed]
+    return f"Variance in the crease by G_max, {'; '.join(told)}."
+
+
+def of_weights(a: Arrays) -> list[Claim]:
+    """What a sum over all techniques would do, as far as balanced weights are one."""
+    unbounded, split = arm(a, "crease", BALANCED, UNBOUNDED), arm(a, "crease", COUNTED, OURS)
+    told = f"balanced weights, unbounded: {unbounded.mean():.3g}; 1/M, G_max = {OURS:g}: {split.mean():.3g}"
+    return [Claim("DDGIR-C08", criteria.reported(told), "variance in the crease")]
+
+
+def draw(a: Arrays) -> "Picture":
+    """Variance and highest values over the bound."""
+    return painted(a, "1 / room height")
+
+
+def painted(a: Arrays, unit: str) -> "Picture":
+    """Three panels; without a bound at the right end."""
+    picture, axes = style.panels(1, 3, width=3.9, height=3.2)
+    names = [*(f"{each:g}" for each in a["bounds"]), UNBOUNDED]
+    panels: Mapping[str, tuple[str, str]] = {
+        "99.9th percentile in the crease": ("crease", "high"),
+        "Variance in the crease": ("crease", "variance"),
+        "Variance away from it": ("away", "variance"),
+    }
+    looks = {BALANCED: style.nth(0, label=BALANCED), COUNTED: style.look("1/M")}
+    for axis, (title, (view, what)) in zip(axes[0], panels.items(), strict=True):
+        for weights in PRESETS:
+            found = np.array([arm(a, view, weights, name, what).mean() for name in names])
+            axis.plot(range(len(names)), found, **looks[weights])
+        axis.set_yscale("log")
+        axis.set_xticks(range(len(names)), names)
+        label = "radiance" if what == "high" else "variance / mean²"
+        axis.set(xlabel=f"G_max, {unit}", ylabel=label, title=title)
+        style.below(axis)
+    return picture
+
+
+CONDITIONS = (
+    Conditions(
+        ("DDGIR-F06",),
+        "[DDGIR Fig. 6]",
+        Setup("real time", "still", "all", "a crease, 128 samples per pixel"),
+        Setup("real time", "still", "all", "frames of chains into a crease and beside it, light by way of x_1"),
+    ),
+    Conditions(
+        ("DDGIR-C08",),
+        "[DDGIR 3.5]",
+        Setup("real time", "still", "all", "said of all scenes"),
+        Setup("real time", "still", "all", "wedge (FS4)"),
+    ),
+)
+
+FIGURE = Figure(
+    id="DDGIR-F06",
+    title="The geometry term bounded, in a wedge",
+    world="flatland2d",
+    source="[DDGIR Fig. 6; 3.5]",
+    claims=("DDGIR-F06", "DDGIR-C08"),
+    conditions=CONDITIONS,
+    presets={
+        "quick": {
+            "room": ROOM,
+            "bounds": [PRINTED, OURS, NARROW],
+            "blocks": 1,
+            "replicas": 8,
+            "groups": 2,
+            "frames": 8,
+        },
+        "paper": {
+            "room": ROOM,
+            "bounds": [1, 3, 10, 30, 100, 1000],
+            "blocks": 2,
+            "replicas": 8,
+            "groups": 8,
+            "frames": 16,
+        },
+    },
+    chunks=chunks,
+    compute=compute,
+    combine=combine,
+    draw=draw,
+    check=check,
+    arm="G_max",
+)
