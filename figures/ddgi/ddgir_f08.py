@@ -42,6 +42,12 @@ TREES, PRIMARY, SECONDARY, OURS, PRINTED = range(len(METHODS))
 ENOUGH = 64
 """Images, or batches, that can tell how many are needed, and whether means are equal."""
 
+WHY = (
+    "G_max = 1 has no unit in the paper.  Per room height it bounds most connections, and the ray that makes up for it "
+    "is as noisy as secondary DDGI; DDGIR-F06 sweeps it."
+)
+"""Why nothing is refuted by the method as printed."""
+
 BY_RAYS = "rays of path tracing / resampled"
 NEVER = "inf: the mean of all images errs more than that, by noise or by bias."
 LONG = 1.25
@@ -74,10 +80,10 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
         found[f"{name}.images"] = np.concatenate([r["images"] for r in chains], axis=2)
         found[f"{name}.spent"] = np.mean([r["spent"] for r in chains], axis=0)
         found[f"{name}.drawn"] = np.mean([r["drawn"] for r in chains], axis=0)
-        found[f"{name}.truth"] = truth(place.room)
+        found[f"{name}.truth"], found[f"{name}.trees"] = truth(place.room), truth_of_trees(place.room)
         if batches:
             found[f"{name}.means"] = np.concatenate(batches)
-            found[f"{name}.direct"], found[f"{name}.trees"] = direct(place.room), truth_of_trees(place.room)
+            found[f"{name}.direct"] = direct(place.room)
     return found
 
 
@@ -86,7 +92,12 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
 
 def errors(a: Arrays, name: str) -> Array:
     """MAPE (history, method, replica)."""
-    return mape_with_floor(a[f"{name}.images"], a[f"{name}.truth"])
+    return mape_with_floor(a[f"{name}.images"], truths(a, name)[:, None])
+
+
+def truths(a: Arrays, name: str) -> Array:
+    """What each method is held against, (method, n): path tracing, which ends after some bounces, against as many."""
+    return np.stack([a[f"{name}.trees"] if k == TREES else a[f"{name}.truth"] for k in range(len(METHODS))])
 
 
 def variances(a: Arrays, name: str) -> Array:
@@ -115,9 +126,9 @@ def frames_to(images: Array, truth: Array, target: float) -> float:
 
 def frames(a: Arrays, name: str, history: int) -> Array:
     """Frames of METHODS to the error of one frame of DDGI resampling, (method,)."""
-    images, at = a[f"{name}.images"][history], a[f"{name}.truth"]
-    target = float(mape_with_floor(images[OURS], at).mean())
-    return np.array([1.0 if k == OURS else frames_to(each, at, target) for k, each in enumerate(images)])
+    images, at = a[f"{name}.images"][history], truths(a, name)
+    target = float(errors(a, name)[history, OURS].mean())
+    return np.array([1.0 if k == OURS else frames_to(each, at[k], target) for k, each in enumerate(images)])
 
 
 def speed_up(a: Arrays, name: str, history: int, charged: float = 1) -> float:
@@ -161,8 +172,9 @@ def check_noise(a: Arrays, k: int) -> list[Claim]:
     def everywhere(x: int, y: int, limit: float, least: int) -> Claim:
         below = {name: criteria.ratio_below(e[name][x], e[name][y], limit) for name in OPEN}
         above = {name: criteria.ratio_above(e[name][x], e[name][y], 1) for name in OPEN}
-        part = f"{METHODS[x]} / {METHODS[y]}, {HISTORIES[k]}"
-        return Claim("DDGIR-F08", in_rooms(below, least), part, in_rooms(above, len(OPEN) - least + 1) if k else None)
+        part, opposite = f"{METHODS[x]} / {METHODS[y]}, {HISTORIES[k]}", in_rooms(above, len(OPEN) - least + 1)
+        told, ours = WHY if x == PRINTED else "", k == 1 and x == OURS
+        return Claim("DDGIR-F08", in_rooms(below, least), part, opposite if ours else None, reason=told)
 
     door, room = e["FS3"], e["FS13"]
     rules = ((TREES, 0.7, 5), (SECONDARY, 0.9, 4))
@@ -247,7 +259,10 @@ def check_bias(a: Arrays) -> list[Claim]:
         found.append(check_means(a, k))
     B = {name: biases(a, name) for name in PLACES}
     less, even = ({name: criteria.below(b[k, 1] / b[k, 0], 1) for name, b in B.items()} for k in range(2))
-    reason = f"Were both right in the mean, as the paper's slider allows: {in_rooms(even, 4).measured}."
+    reason = (
+        "Direct light in updates of probes is attenuated by too much in open rooms, which primary DDGI does not suffer "
+        f"from.  Were both right in the mean, as the paper's slider allows: {in_rooms(even, 4).measured}."
+    )
     part, enough = "bias, secondary / primary", len(a["FS2.means"]) >= ENOUGH
     few = Claim("DDGIR-F08b", None, part, reason="Too few samples for images without noise.")
     found.append(Claim("DDGIR-F08b", in_rooms(less, 4), part, reason=reason) if enough else few)
@@ -266,8 +281,9 @@ def check_means(a: Arrays, k: int) -> Claim:
 
 def same_mean(a: Arrays, name: str, k: int, ours: int = OURS) -> Outcome:
     """E[resampled] = E[secondary], by images that share their x_1."""
-    images, at = a[f"{name}.images"][k].mean(axis=-1), float(a[f"{name}.truth"].mean())
-    return criteria.unbiased(images[ours] - images[SECONDARY] + at, at, 0.01)
+    images = a[f"{name}.images"][k].mean(axis=-1)
+    at = float(images[SECONDARY].mean())
+    return criteria.unbiased(images[ours] - images[SECONDARY] + at, at, 0.02)
 
 
 def check_trees(a: Arrays) -> list[Claim]:

@@ -29,8 +29,8 @@ DEPTH = 12
 DEEP = 24
 """The depth of the truth where that is traced: after so many bounces a fifth of a thousandth is left."""
 
-PANELS, FILM = 24, 8
-"""Panels per segment, and points per part of a pixel: errors of some .1%."""
+PANELS, FILM = 48, 8
+"""Panels per segment, and points per part of a pixel: the mean errs by .05% at most, behind the door ajar."""
 
 TRACED = ("glossy_cornell",)
 """Rooms with other lobes than Lambert's."""
