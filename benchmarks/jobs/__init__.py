@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 from benchmarks.jobs import (
     baselines,
+    cached,
     deep_references,
     extremes,
     gradients,
@@ -28,7 +29,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "references": references.JOB,
         "indirect references": indirect_references.JOB,
         "space references": space_references.JOB,
-        "deep references": deep_references.JOB,
+        "all bounces references": deep_references.JOB,
         "round trips": roundtrips.JOB,
         "re-tracing": retracing.JOB,
         "extremes": extremes.JOB,
@@ -36,6 +37,7 @@ JOBS: Mapping[str, Job] = MappingProxyType(
         "tracing": tracing.JOB,
         "baselines": baselines.JOB,
         "offline": offline.JOB,
+        "cached": cached.JOB,
         "probes": probes.JOB,
         "gradients": gradients.JOB,
         "mutations": mutations.JOB,
@@ -47,7 +49,7 @@ PUBLISH: Mapping[str, Callable[[Done, Path], None]] = MappingProxyType(
         "references": references.publish,
         "indirect references": indirect_references.publish,
         "space references": space_references.publish,
-        "deep references": deep_references.publish,
+        "all bounces references": deep_references.publish,
         "witness": witness.publish,
     }
 )

@@ -13,12 +13,11 @@ import numpy as np
 from benchmarks.jobs.job import ROOT, Done, Job, Params, Row, parts
 from benchmarks.jobs.references import LIMIT, image, traced
 from figures.claims.figure import Arrays
-from figures.experiments.deep import ALL_BOUNCES, PATH
+from figures.experiments.deep import ALL_BOUNCES, DEEP, PATH
 from figures.experiments.references import fingerprint, key_of, save
 from flatland2d.scenes import SCENES
 
-SCENE, DEEP = "glossy_cornell", 24
-"""The depth of paths: of light that walls scatter, .7^24 goes on, a fifth of a thousandth."""
+SCENE = "glossy_cornell"
 CHUNKS, LATTICES = 16, 4
 
 
