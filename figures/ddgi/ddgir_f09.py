@@ -130,7 +130,7 @@ def same_mean(a: Arrays, room: str) -> Claim:
 
 def draw(a: Arrays) -> "Picture":
     """One frame of each as strips, with the converged image and the truth; and errors."""
-    picture, axes = style.panels(1, 3, width=4.6, height=4.0)
+    picture, axes = style.panels(1, 3, width=4.2, height=3.4)
     for axis, room in zip(axes[0], ROOMS, strict=False):
         draw_strips(axis, a, room)
     draw_errors(axes[0, 2], a)
