@@ -147,7 +147,7 @@ FIGURE = Figure(
     ),
     presets={
         "quick": {"blocks": 1, "replicas": 8, "frames": 6, "tolerance": 0.05},
-        "paper": {"blocks": 4, "replicas": 16, "frames": 20, "tolerance": 0.01},
+        "paper": {"blocks": 12, "replicas": 16, "frames": 20, "tolerance": 0.01},
     },
     chunks=chunks,
     compute=compute,
