@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from restir_ref.transport import materials as mat
 from restir_ref.transport.cache.leaving import telling, undisplaced
 from restir_ref.transport.cache.update import Updating, update
 from restir_ref.transport.materials import Layer, Material, Vertex, evaluate_lobe
