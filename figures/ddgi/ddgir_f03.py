@@ -121,9 +121,10 @@ NO_GLASS = "The truth behind glass has to be traced: the paper preset does."
 
 REASONS: Mapping[str, str] = {
     "FS11": (
-        "Nine tenths of what leaks at x_2 comes over less than 0.1, from the corner's own strip of floor: so near, a query "
-        "along the path is hardly displaced, and the wall is as far from the probes beyond it as the point is. The "
-        "paper's own scene of thin walls in strong sun has .27 at x_1 and .45 at x_2 in Fig. 8."
+        "At x_1, seen from afar, queries are displaced into the room and leak little. At x_2 nine tenths of what leaks comes "
+        "over less than 0.1, from the corner's own floor: so near, displaced queries go nowhere or through the wall, and "
+        "the wall is as far from the probes beyond it as the point is. The paper's own scene of thin walls in strong sun "
+        "has .27 at x_1 and .45 at x_2 in Fig. 8."
     ),
     "FS4": (
         "The gap is 0.03 high, a quarter to one spacing: from the floor below the furniture x_2 is in the gap as well, "
@@ -167,7 +168,10 @@ def sharper(a: Arrays, name: str) -> list[Claim]:
 def draw(a: Arrays) -> "Picture":
     """Rows of pixels of two rooms; bias over spacing of two."""
     picture, axes = style.panels(2, 2, width=4.4, height=3.1)
-    for axis, name, where in ((axes[0, 0], "FS11", "beside the sunny wall"), (axes[0, 1], "FS4", "below the furniture")):
+    for axis, name, where in (
+        (axes[0, 0], "FS11", "beside the sunny wall"),
+        (axes[0, 1], "FS4", "below the furniture"),
+    ):
         draw_row(axis, a, name, where)
     for axis, name in ((axes[1, 0], "FS4"), (axes[1, 1], CAUSTIC)):
         draw_errors(axis, a, name)

@@ -117,12 +117,17 @@ def off_surface(spacing: float) -> Displacement:
 
 @once
 def volume(
-    name: str, per_unit: float, rule: Rule = AUGMENTED, attenuation: float = 1.0, tolerance: float = TOLERANCE
+    name: str,
+    per_unit: float,
+    rule: Rule = AUGMENTED,
+    attenuation: float = 1.0,
+    tolerance: float = TOLERANCE,
+    rays: int = 64,
 ) -> Volume:
     """The converged volume of a view's room: always the same.  Updates look back along their rays."""
     setting = view(name).setting
     empty = unlit(setting.scene, probes(setting, per_unit), MAPS)
-    how = Updating(telling(along_view(1 / per_unit)), rule, attenuation=attenuation)
+    how = Updating(telling(along_view(1 / per_unit)), rule, rays, attenuation=attenuation)
     return converge(empty, setting.scene, how, Live(np.random.default_rng(STREAM)), tolerance=tolerance)
 
 
@@ -143,6 +148,16 @@ def seen(name: str, u: Array) -> Seen:
     of, n = view(name), len(u)
     x, w, _ = of.sensor(n).ray(np.arange(n), u[None])
     v, r, _ = arrive(of.setting.scene, x, w)
+    return Seen(v, r, of.region(v.x))
+
+
+def met(name: str, N: int, chance: Chance) -> Seen:
+    """N surface points that rays meet which go anywhere from anywhere on the room's map."""
+    of = view(name)
+    low, high = (np.array(each)[:, None] for each in (of.setting.low, of.setting.high))
+    s, u = of.setting.scene, chance.uniform((3, N))
+    v, r, hit = arrive(s, low + u[:2] * (high - low), s.space.sphere(u[2:]))
+    v, r = take((v, r), np.flatnonzero(hit))
     return Seen(v, r, of.region(v.x))
 
 
