@@ -71,12 +71,8 @@ def check(a: Arrays) -> list[Claim]:
     dark = criteria.biased(image["original"] / image["truth"], 1, -1, -0.01)
     lacking = image["augmented"] - image["original"]
     bias = {name: float((image[name] / image["truth"] - 1).mean()) for name in RULES}
-    lacked = [
-        f"1/{1 / h:g}: {share:.2f}"
-        for h, share in zip(
-            a["spacings"], (a["augmented"] - a["original"]).mean(axis=(1, 2)) / a["second"].mean(), strict=True
-        )
-    ]
+    shares = (a["augmented"] - a["original"]).mean(axis=(1, 2)) / a["second"].mean()
+    lacked = [f"1/{1 / h:g}: {share:.2f}" for h, share in zip(a["spacings"], shares, strict=True)]
     told = f"Bias of the image {100 * bias['original']:+.1f} % by Eq. 4, {100 * bias['augmented']:+.1f} % by Eq. 5."
     return [
         Claim("DDGIR-C01", dark, "FS3, image by original probes", reason=told),
@@ -85,8 +81,8 @@ def check(a: Arrays) -> list[Claim]:
             criteria.ratio_within(lacking, image["second"], 0.95, 1.05),
             "FS3, what is lacking / direct light at the second vertex",
             reason=(
-                f"{told} Probes of the lit room tell behind the wall, which is one facet thick; what leaks from them is lit "
-                "directly, and augmented probes have it bounce on."
+                f"{told} Probes of the lit room tell behind the wall, which is one facet thick; what leaks from them is "
+                "lit directly, and augmented probes have it bounce on."
             ),
         ),
         Claim("DDGIR-C01", criteria.reported(", ".join(lacked)), "FS3, the same ratio by spacing"),

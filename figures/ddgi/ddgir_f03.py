@@ -1,9 +1,10 @@
-"""DDGI resampling Fig. 3 and Sec. 5.2: where probes leak and lose contact shadows, at x_1, at x_2, and by their spacing.
+"""DDGI resampling Fig. 3 and Sec. 5.2: where probes leak and lose contact shadows, at x_1 and at x_2.
 
 Indirect light of a row of pixels by primary queries, of probes without direct light, and by secondary ones, of
 augmented probes, with specular recursion; each against the truth at the very points that are seen.  Volumes are frozen,
 displaced as the paper has it: off the surface at x_1, along the path at x_2.  FS11 is seen where its
-probes leak, in a corner beside the wall that the sun shines upon from outside; FS4 from before the furniture, into the gap below it; FS8 by its own.
+probes leak, in a corner beside the wall that the sun shines upon from outside; FS4 from before the furniture, into the
+gap below it; FS8 by its own eye.  Below, bias by the spacing of probes.
 
 A third estimate displaces queries at x_2 as those at x_1: what it leaks less is due to the displacement (Fig. 5).
 """
@@ -53,7 +54,7 @@ def chunks(preset: Any) -> Sequence[Any]:
 
 
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
-    """Indirect light and its truth, (replicas, pixels) each, and what is in the region; or the traced truth (pixels,)."""
+    """Indirect light and its truth (replicas, pixels), and what is in the region; or the traced truth (pixels,)."""
     chance = Live(rng)
     if "traced" in chunk:
         return {"truth": traced(CAUSTIC, preset["pixels"], preset["traced"], chance)}
@@ -121,10 +122,10 @@ NO_GLASS = "The truth behind glass has to be traced: the paper preset does."
 
 REASONS: Mapping[str, str] = {
     "FS11": (
-        "At x_1, seen from afar, queries are displaced into the room and leak little. At x_2 nine tenths of what leaks comes "
-        "over less than 0.1, from the corner's own floor: so near, displaced queries go nowhere or through the wall, and "
-        "the wall is as far from the probes beyond it as the point is. The paper's own scene of thin walls in strong sun "
-        "has .27 at x_1 and .45 at x_2 in Fig. 8."
+        "At x_1, seen from afar, queries are displaced into the room and leak little. At x_2 nine tenths of what leaks "
+        "comes over less than 0.1, from the corner's own floor: so near, displaced queries go nowhere or through the "
+        "wall, and the wall is as far from the probes beyond it as the point is. The paper's own scene of thin walls in "
+        "strong sun has .27 at x_1 and .45 at x_2 in Fig. 8."
     ),
     "FS4": (
         "The gap is 0.03 high, a quarter to one spacing: from the floor below the furniture x_2 is in the gap as well, "
@@ -230,7 +231,7 @@ FIGURE = Figure(
             ("DDGIR-F03", "DDGIR-C10"),
             "Fig. 3",
             paper=Setup("one pass", "still", "indirect", "a living room: below the couch, objects on tables"),
-            ours=Setup("one pass", "still", "indirect", "FS11's corner beside the sunny wall, FS4's gap below furniture, FS8's caustic"),
+            ours=Setup("one pass", "still", "indirect", "FS11's sunny corner, FS4's gap below furniture, FS8's caustic"),
         ),
     ),
     chunks=chunks,

@@ -81,12 +81,13 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
 
 REASONS: Mapping[str, str] = {
     "FS4, 30 degrees": (
-        "No query along the path is moved through a surface, and many off the surface are. But the energy leaks all the "
-        "same: in the wedge every query has corners of its cell on the slope's other side, which Chebyshev's test lets in."
+        "No query along the path is moved through a surface, and many off the surface are. But energy leaks all the "
+        "same: in the wedge queries have corners of their cells on the slope's other side, and Chebyshev's test lets "
+        "them in."
     ),
     "FS11": (
-        "Hardly anything is moved through the thin wall, and nothing along the path. What leaks is told by probes beyond "
-        "it: in the corner the wall is as far from them as the point is, so that Chebyshev's test lets them in."
+        "Hardly anything is moved through the thin wall, and nothing along the path. What leaks is told by probes "
+        "beyond it: in the corner the wall is as far from them as the point is, so that Chebyshev's test lets them in."
     ),
 }
 
