@@ -81,8 +81,8 @@ def check(a: Arrays) -> list[Claim]:
             criteria.ratio_within(lacking, image["second"], 0.95, 1.05),
             "FS3, what is lacking / direct light at the second vertex",
             reason=(
-                f"{told} Probes of the lit room tell behind the wall, which is one facet thick; what leaks from them is "
-                "lit directly, and augmented probes have it bounce on."
+                f"{told} What is lacking is a tenth of the light that probes hold, and at this spacing they hold some "
+                "percent too much, more so by Eq. 5, as light bounces off what probes before walls know."
             ),
         ),
         Claim("DDGIR-C01", criteria.reported(", ".join(lacked)), "FS3, the same ratio by spacing"),

@@ -1,9 +1,9 @@
 """DDGI resampling Sec. 3.2: probes nearer to a light than surfaces are too bright, and attenuation makes up for it.
 
 FS12.  On the left lamp, probe and table in line, one probe at a time: what it says of the table's direct light, over
-the truth.  The plain ratio is that of distances, (s + b)/s, to the first power in flatland.  In the middle and on the right
-a volume of all light: its irradiance on all that is seen, by the spacing of probes, and pixel by pixel for 4 per unit,
-for which the room is made.
+the truth.  The plain ratio is that of distances, (s + b)/s, to the first power in flatland.  In the middle and on the
+right a volume of all light: its irradiance on all that is seen, by the spacing of probes, and pixel by pixel for 4 per
+unit, for which the room is made.
 """
 
 from collections.abc import Mapping, Sequence

@@ -124,8 +124,8 @@ REASONS: Mapping[str, str] = {
     "FS11": (
         "At x_1, seen from afar, queries are displaced into the room and leak little. At x_2 nine tenths of what leaks "
         "comes over less than 0.1, from the corner's own floor: so near, displaced queries go nowhere or through the "
-        "wall, and the wall is as far from the probes beyond it as the point is. The paper's own scene of thin walls in "
-        "strong sun has .27 at x_1 and .45 at x_2 in Fig. 8."
+        "wall, and the wall is as far from the probes beyond it as the point is. The paper's own scene of thin walls "
+        "in strong sun has .27 at x_1 and .45 at x_2 in Fig. 8."
     ),
     "FS4": (
         "The gap is 0.03 high, a quarter to one spacing: from the floor below the furniture x_2 is in the gap as well, "
@@ -231,7 +231,7 @@ FIGURE = Figure(
             ("DDGIR-F03", "DDGIR-C10"),
             "Fig. 3",
             paper=Setup("one pass", "still", "indirect", "a living room: below the couch, objects on tables"),
-            ours=Setup("one pass", "still", "indirect", "FS11's sunny corner, FS4's gap below furniture, FS8's caustic"),
+            ours=Setup("one pass", "still", "indirect", "FS11's sunny corner, FS4's gap, FS8's caustic"),
         ),
     ),
     chunks=chunks,
