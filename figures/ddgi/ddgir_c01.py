@@ -34,6 +34,16 @@ ROOM = "FS3"
 RULES = {"augmented": AUGMENTED, "original": ORIGINAL}
 LABELS = {"augmented": "augmented probes, Eq. 5", "original": "probes without direct light, Eq. 4"}
 
+PARTS = (
+    "FS3, image by original probes",
+    "FS3, what is lacking / direct light at the second vertex",
+    "FS3, the same ratio by spacing",
+)
+ENOUGH = 16
+"""Replicas."""
+
+NOISY = "Light through the slit is rare, and eight replicas of few rays do not tell: the paper preset does."
+
 
 def chunks(preset: Any) -> Sequence[Any]:
     """One per spacing: both volumes serve all points."""
@@ -74,18 +84,16 @@ def check(a: Arrays) -> list[Claim]:
     shares = (a["augmented"] - a["original"]).mean(axis=(1, 2)) / a["second"].mean()
     lacked = [f"1/{1 / h:g}: {share:.2f}" for h, share in zip(a["spacings"], shares, strict=True)]
     told = f"Bias of the image {100 * bias['original']:+.1f} % by Eq. 4, {100 * bias['augmented']:+.1f} % by Eq. 5."
+    reason = (
+        f"{told} What is lacking is a tenth of the light that probes hold, and at this spacing they hold some percent too "
+        "much, more so by Eq. 5, as light bounces off what probes before walls know."
+    )
+    if len(lacking) < ENOUGH:
+        return [Claim("DDGIR-C01", None, part, reason=NOISY) for part in PARTS]
     return [
-        Claim("DDGIR-C01", dark, "FS3, image by original probes", reason=told),
-        Claim(
-            "DDGIR-C01",
-            criteria.ratio_within(lacking, image["second"], 0.95, 1.05),
-            "FS3, what is lacking / direct light at the second vertex",
-            reason=(
-                f"{told} What is lacking is a tenth of the light that probes hold, and at this spacing they hold some "
-                "percent too much, more so by Eq. 5, as light bounces off what probes before walls know."
-            ),
-        ),
-        Claim("DDGIR-C01", criteria.reported(", ".join(lacked)), "FS3, the same ratio by spacing"),
+        Claim("DDGIR-C01", dark, PARTS[0], reason=told),
+        Claim("DDGIR-C01", criteria.ratio_within(lacking, image["second"], 0.95, 1.05), PARTS[1], reason=reason),
+        Claim("DDGIR-C01", criteria.reported(", ".join(lacked)), PARTS[2]),
     ]
 
 

@@ -80,7 +80,7 @@ def one_probe(height: float, scale: float, preset: Any, chance: Chance) -> Array
     table = Vertex(x, n, n, np.zeros(1, dtype=int), np.array([on_table(s)]), np.ones(1, dtype=bool))
     truth = direct(ROOM, table)[0] * 2 / s.materials.colour[0, 0]
     told = [update(empty, s, how, chance).irradiance(x, n, n, 0 * x)[0, 0] for _ in range(preset["frames"])]
-    return np.array(told) / truth
+    return np.asarray(np.array(told) / truth)
 
 
 def on_table(s: Scene) -> int:

@@ -218,7 +218,7 @@ FIGURE = Figure(
     claims=("DDGIR-F03", "DDGIR-C10"),
     presets={
         "quick": {
-            "per_unit": 8, "spacings": [4, 8, 16], "pixels": 32, "rays": 64, "replicas": 8, "tolerance": 0.03,
+            "per_unit": 8, "spacings": [8, 16, 32], "pixels": 32, "rays": 64, "replicas": 8, "tolerance": 0.06,
             "traced": 0,
         },
         "paper": {
