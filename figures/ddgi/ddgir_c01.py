@@ -85,8 +85,8 @@ def check(a: Arrays) -> list[Claim]:
     lacked = [f"1/{1 / h:g}: {share:.2f}" for h, share in zip(a["spacings"], shares, strict=True)]
     told = f"Bias of the image {100 * bias['original']:+.1f} % by Eq. 4, {100 * bias['augmented']:+.1f} % by Eq. 5."
     reason = (
-        f"{told} What is lacking is a tenth of the light that probes hold, and at this spacing they hold some percent too "
-        "much, more so by Eq. 5, as light bounces off what probes before walls know."
+        f"{told} What is lacking is a tenth of the light that probes hold, and at this spacing they hold some percent "
+        "too much, more so by Eq. 5, as light bounces off what probes before walls know."
     )
     if len(lacking) < ENOUGH:
         return [Claim("DDGIR-C01", None, part, reason=NOISY) for part in PARTS]
@@ -115,8 +115,8 @@ def draw(a: Arrays) -> "Picture":
     right.plot(a["second"].mean(axis=0), **style.look("truth", label="direct light at $x_2$, exact"))
     for axis, title in ((left, "FS3, all light"), (right, "What Eq. 4 lacks at $x_2$")):
         axis.set(xlabel="pixel", ylabel="radiance", title=title)
-        axis.set_ylim(bottom=0)
-        axis.legend()
+        axis.set_ylim(bottom=min(0, axis.get_ylim()[0]), top=1.3 * axis.get_ylim()[1])
+        axis.legend(loc="upper right")
     return picture
 
 

@@ -159,7 +159,6 @@ def draw(a: Arrays) -> "Picture":
         row.plot(a[f"{1 / a['spacings'][0]:g} {scale} told"].mean(axis=0), **replace_every(look))
     line.plot(a["heights"] - TABLE, predicted(a["heights"]), **style.look("truth", label="(s + b) / s"))
     line.set(xlabel="probe's height b above the table", ylabel="E over the truth", title="One probe in line")
-    room.axhline(0, color=style.GREY, lw=0.8)
     room.set(xscale="log", xlabel="probe spacing (scene units)", ylabel="bias (%)", title="FS12: light on what is seen")
     room.set_xticks(a["spacings"], [f"1/{1 / h:g}" for h in a["spacings"]])
     room.minorticks_off()

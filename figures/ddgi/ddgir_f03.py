@@ -169,32 +169,25 @@ def sharper(a: Arrays, name: str) -> list[Claim]:
 def draw(a: Arrays) -> "Picture":
     """Rows of pixels of two rooms; bias over spacing of two."""
     picture, axes = style.panels(2, 2, width=4.4, height=3.1)
-    for axis, name, where in (
-        (axes[0, 0], "FS11", "beside the sunny wall"),
-        (axes[0, 1], "FS4", "below the furniture"),
-    ):
-        draw_row(axis, a, name, where)
+    draw_row(axes[0, 0], a, "FS11", "corner by the sunny wall", "upper right")
+    draw_row(axes[0, 1], a, "FS4", "below the furniture", "lower left")
     for axis, name in ((axes[1, 0], "FS4"), (axes[1, 1], CAUSTIC)):
         draw_errors(axis, a, name)
     return picture
 
 
-def draw_row(axis: "Axes", a: Arrays, name: str, where: str) -> None:
+def draw_row(axis: "Axes", a: Arrays, name: str, where: str, place: str) -> None:
     """Mean of the replicas; the region is marked."""
     key = f"{name} {float(a['per unit']):g}"
     inside = a[f"{key} inside"].mean(axis=0) > 0.5
     for method in ("truth", "primary", "secondary"):
         axis.plot(a[f"{key} {method}"].mean(axis=0), **LOOKS[method])
-    axis.plot(a[f"{key} {OFF}"].mean(axis=0), **style.nth(6, label="secondary, off the surface"))
-    low, high = axis.get_ylim()
-    axis.fill_between(
-        np.arange(len(inside)), low, high, where=inside, color=style.PALE, lw=0, zorder=0, label=where, alpha=0.7
-    )
-    axis.set(
-        xlabel="pixel", ylabel="indirect radiance", title=f"{name}, {float(a['per unit']):g} probes per unit",
-        ylim=(min(low, 0), high),
-    )  # fmt: skip
-    style.below(axis, ncols=3)
+    axis.plot(a[f"{key} {OFF}"].mean(axis=0), **style.nth(6, label=OFF))
+    high, pixel = axis.get_ylim()[1], np.arange(len(inside))
+    axis.fill_between(pixel, 0, high, where=inside, color=style.PALE, lw=0, zorder=0, label=where)
+    title = f"{name}, {float(a['per unit']):g} probes per unit"
+    axis.set(xlabel="pixel", ylabel="indirect radiance", title=title, ylim=(0, high))
+    axis.legend(loc=place)
 
 
 def draw_errors(axis: "Axes", a: Arrays, name: str) -> None:
@@ -202,12 +195,13 @@ def draw_errors(axis: "Axes", a: Arrays, name: str) -> None:
     axis.set(title=f"{name}: |bias| over mean light", xlabel="probe spacing (scene units)", ylabel="relative |bias|")
     if name == CAUSTIC and "traced truth" not in a:
         axis.text(0.5, 0.5, "paper preset only", ha="center", va="center", transform=axis.transAxes)
+        axis.set(xticks=[], yticks=[])
         return
     for method in ("primary", "secondary"):
         axis.loglog(a["spacings"], by_spacing(a, name, method).mean(axis=1), **{**LOOKS[method], "markevery": 1})
     axis.set_xticks(a["spacings"], [f"1/{1 / h:g}" for h in a["spacings"]])
     axis.minorticks_off()
-    axis.legend()
+    axis.legend(loc="lower right")
 
 
 FIGURE = Figure(
