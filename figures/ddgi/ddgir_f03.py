@@ -211,12 +211,12 @@ FIGURE = Figure(
     claims=("DDGIR-F03", "DDGIR-C10"),
     presets={
         "quick": {
-            "per_unit": 8, "spacings": [8, 16, 32], "pixels": 32, "rays": 64, "replicas": 8, "tolerance": 0.06, "glass tolerance": 0.06,
-            "traced": 0,
+            "per_unit": 8, "spacings": [8, 16, 32], "pixels": 32, "rays": 64, "replicas": 8, "tolerance": 0.06,
+            "glass tolerance": 0.06, "traced": 0,
         },
         "paper": {
-            "per_unit": 16, "spacings": [8, 16, 32], "pixels": 64, "rays": 256, "replicas": 16, "tolerance": 0.01, "glass tolerance": 0.03,
-            "traced": 8192,
+            "per_unit": 16, "spacings": [8, 16, 32], "pixels": 64, "rays": 256, "replicas": 16, "tolerance": 0.01,
+            "glass tolerance": 0.03, "traced": 8192,
         },
     },
     conditions=(
