@@ -17,7 +17,6 @@ import numpy as np
 from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments.volumes import (
-    LOOKS,
     along_view,
     arriving,
     at_first,
@@ -43,6 +42,13 @@ CAUSTIC = "FS8"
 """The room with glass, whose truth has to be traced."""
 
 OFF = "secondary, off the surface"
+
+
+LOOKS: Mapping[str, Mapping[str, Any]] = {
+    "primary": style.nth(4, label="primary queries"),
+    "secondary": style.nth(5, label="secondary queries"),
+    "truth": style.look("truth"),
+}
 
 
 def chunks(preset: Any) -> Sequence[Any]:

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from functools import cache as once
 from functools import partial
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
-from figures.report import style
 from flatland2d import SCENES, radiosity
 from flatland2d.directions import MAPS
 from flatland2d.probe_rooms import lamp_beside_probe, probes, sunlit
@@ -258,13 +256,3 @@ def leaking(c: Cache, v: Volume, rays: Arriving) -> Array:
     b = displacement(c, z, rays.at.r)
     E = leaked(v, s, z.x, z.n, b)
     return rays.shown(diffuse_albedo(s.materials, z) / 2 * E * rays.at.wanted)
-
-
-LOOKS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
-    {
-        "primary": style.nth(4, label="primary queries"),
-        "secondary": style.nth(5, label="secondary queries"),
-        "truth": style.look("truth"),
-    }
-)
-"""What queries look like in pictures."""

@@ -69,7 +69,7 @@ def questions(v: Volume) -> Question:
     """Around and beyond the grid, all beyond doubt."""
     d, last = v.grid.d, np.array(v.grid.counts)[:, None] - 1
     low, size = np.array(v.grid.origin)[:, None], np.array(v.grid.spacing)[:, None]
-    x = low + size * ((last + 1.5) * lattice(d, POOL, 0) - 0.75)
+    x = low + size * ((last + 2.5) * lattice(d, POOL, 0) - 1.25)
     n, w = (single(normalize(lattice(d, POOL, 3 * k) * 2 - 1)) for k in (1, 2))
     q = Question(single(x), n, w, single(n * 0.25 * size.min()))
     return take(q, np.flatnonzero(clear(v, q))[:KEPT])
