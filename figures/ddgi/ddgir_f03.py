@@ -174,7 +174,7 @@ def sharper(a: Arrays, name: str) -> list[Claim]:
 def draw(a: Arrays) -> "Picture":
     """Rows of pixels of two rooms; bias over spacing of two."""
     picture, axes = style.panels(2, 2, width=4.4, height=3.1)
-    draw_row(axes[0, 0], a, "FS11", "corner by the sunny wall", "upper right")
+    draw_row(axes[0, 0], a, "FS11", "corner by the sunny wall", "center left")
     draw_row(axes[0, 1], a, "FS4", "below the furniture", "lower left")
     for axis, name in ((axes[1, 0], "FS4"), (axes[1, 1], CAUSTIC)):
         draw_errors(axis, a, name)
