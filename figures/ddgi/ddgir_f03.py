@@ -231,7 +231,7 @@ FIGURE = Figure(
             "Fig. 3",
             paper=Setup("one pass", "still", "all", "a living room: below the couch, objects on tables"),
             ours=Setup("one pass", "still", "indirect", "FS11's sunny corner, FS4's gap, FS8's caustic"),
-            why="Direct light of x_1 is exact by ReSTIR DI in both: it has no part in biases, of which ratios are taken.",
+            why="Direct light of x_1 is exact by ReSTIR DI in both: it has no part in biases.",
         ),
     ),
     chunks=chunks,

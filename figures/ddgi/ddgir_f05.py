@@ -150,7 +150,7 @@ FIGURE = Figure(
             "Fig. 5",
             paper=Setup("one pass", "still", "all", "sharp corners of a room"),
             ours=Setup("one pass", "still", "indirect", "FS4 with a wedge of 30 degrees; FS11's corner"),
-            why="Direct light of x_1 is exact by ReSTIR DI in both: it has no part in biases, of which ratios are taken.",
+            why="Direct light of x_1 is exact by ReSTIR DI in both: it has no part in biases.",
         ),
     ),
     chunks=chunks,
