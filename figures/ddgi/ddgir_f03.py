@@ -123,6 +123,11 @@ def slopes(h: Array, error: Array) -> Array:
     return np.asarray(x @ np.log(error) / (x @ x))
 
 
+GLASS = (
+    " Of light through the glass probes hold only what the glass itself is told, filtered by a cosine: a caustic is not "
+    "there at any spacing."
+)
+
 NO_GLASS = "The truth behind glass has to be traced: the paper preset does."
 
 REASONS: Mapping[str, str] = {
@@ -162,7 +167,7 @@ def sharper(a: Arrays, name: str) -> list[Claim]:
     p, s = (slopes(a["spacings"], each) for each in error.values())
     steps = [float((each.mean(axis=1)[1:] / each.mean(axis=1)[:-1]).max()) for each in error.values()]
     falls = [criteria.below(step, 1) for step in steps]
-    told = f"Slopes {p.mean():.2f} at x_1 and {s.mean():.2f} at x_2."
+    told = f"Slopes {p.mean():.2f} at x_1 and {s.mean():.2f} at x_2.{GLASS if name == CAUSTIC else ''}"
     steeper = criteria.above(float(p.mean() - s.mean()), 0)
     counter = criteria.below(float(p.mean() - s.mean()), 0)
     return [
