@@ -145,8 +145,9 @@ def index(folder: Path) -> Index:
 
 
 def searched(folder: Path, word: str) -> list[str]:
-    """The pages on which a search for one word finds it: in the last part of functions' names first, then in texts."""
+    """The pages on which a search for one word finds it: functions of that name, names that hold it, then texts."""
     found = index(folder)
-    named = [at for name, at in found.functions.items() if word in name.rpartition(".")[2].lower()]
+    last = [(name.rpartition(".")[2].lower(), at) for name, at in found.functions.items()]
+    named = [at for name, at in sorted(last, key=lambda each: each[0] != word) if word in name]
     stem = max((stem for stem in found.stems if word.startswith(stem)), key=len, default="")
     return list(dict.fromkeys(found.pages[at] for at in (*named, *found.stems.get(stem, ()))))

@@ -209,13 +209,16 @@ def _claim(id_: str, checks: Sequence[Mapping[str, Any]], here: str) -> Iterator
 
 
 def tests(id_: str, here: str) -> Iterator[str]:
-    """The tests that show a claim, with the parts that they show."""
-    names = [each for each in shown_by().get(id_, ()) if each.kind == "tests"]
-    for each in names:
-        path, _, name = each.name.partition("::")
+    """The tests that show a claim, each once, with the parts that they show and in which worlds if it is several."""
+    found = [each for each in shown_by().get(id_, ()) if each.kind == "tests"]
+    for test in dict.fromkeys(each.name for each in found):
+        marks = [each for each in found if each.name == test]
+        worlds = dict.fromkeys(each.world for each in marks)
+        parts = dict.fromkeys(filter(None, (each.part for each in marks)))
+        path, _, name = test.partition("::")
         to = layout.way(here, layout.code_place(path, words.line_of(path, name)))
-        part = f" ({each.part})" if each.part else ""
-        yield f"- `{words.plain(each.name)} <{to}>`__{words.plain(part)}"
+        said = "; ".join([*parts, *([", ".join(worlds)] if len(worlds) > 1 else [])])
+        yield f"- `{words.plain(test)} <{to}>`__" + (f" ({words.plain(said)})" if said else "")
     yield ""
 
 

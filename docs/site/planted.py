@@ -20,21 +20,24 @@ from PIL import Image as Raster
 
 from docs.site.symptoms import slug
 from figures.report import style
-from flatland2d import setting
+from flatland2d import scenes, setting
 from flatland2d.pictures import outline
 from flatland2d.scenes import Setting
+from flatland2d.space import PLANE
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.images import random_in_disk
-from restir_ref.integrals import NOWHERE, Image, Pixels, Reservoirs, Shifted
+from restir_ref.integrals import Image, Pixels, Reservoirs, Shifted
 from restir_ref.oracle.cells import Frame
 from restir_ref.oracle.scenes import Loop, Parts, next_pixel
 from restir_ref.oracle.zoo import BUGS, INEFFICIENT, Bug, exact_bias
+from restir_ref.oracle.zoo.checks import statistics
 from restir_ref.restir import initial, shade, spatial, temporal
 from restir_ref.transport.paths import Connectability, Tracer
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.proofs.zoo.bug import TransportBug
 from restir_ref.transport.restir_pt import PathIntegrals, ScatteredIntegrals
+from restir_ref.transport.scene import Scene, scene
 
 FOLDER = Path(__file__).resolve().parents[1] / "symptoms"
 SIDE, RADIUS, DEPTH, RULE = 40, 5, 2, Connectability(roughness=0.2, distance=0.02)
@@ -44,8 +47,8 @@ REPLICAS, BATCHES = 60, 4
 EXPOSURE = 1 / 3
 """Brings targets near 1, where thresholds of the zoo are meant to be."""
 
-STEP = 4
-"""Pixels by which the map moves between two frames, for the mistake that is about motion."""
+STEP = 0.15
+"""How far the right box moves between two frames, for the mistake that is about motion."""
 
 
 @cache
@@ -54,12 +57,17 @@ def room() -> Setting:
     return setting("cornell")
 
 
+def standing(step: float) -> Scene:
+    """The same room with the right box so far to the left."""
+    boxes = scenes.boxes(1)
+    left, right = boxes[:4], [replace(each, corners=[(x - step, y) for x, y in each.corners]) for each in boxes[4:]]
+    facets = [*scenes.room(0), *left, *right, *scenes.chain(scenes.LAMP, 0, 8.0)]
+    return scene(PLANE, [scenes.mixed(0.5, 0.5, 0.2), scenes.mixed(0.3, 0.5, 0.5)], facets)
+
+
 def seen(step: float = 0) -> ScatteredIntegrals:
-    """Its fluence, SIDE x SIDE pixels, moved by so many pixels to the left."""
-    sensor = room().fluence(SIDE, SIDE)
-    by = step * (sensor.high[0] - sensor.low[0]) / SIDE
-    (x, y), (X, Y) = sensor.low, sensor.high
-    return ScatteredIntegrals(Tracer(room().scene, replace(sensor, low=(x - by, y), high=(X - by, Y)), DEPTH, RULE))
+    """Its fluence, SIDE x SIDE pixels."""
+    return ScatteredIntegrals(Tracer(standing(step), room().fluence(SIDE, SIDE), DEPTH, RULE))
 
 
 # ---------------------------------------------------------------- loops of the zoo in flatland
@@ -160,13 +168,12 @@ def reusing(of: PathIntegrals) -> Loop:
 
 
 def moving(rated: PathIntegrals) -> Loop:
-    """New samples and the history of a map that stood STEP pixels further to the left, rated by some integrals."""
+    """New samples and the history of a frame in which the right box stood elsewhere, rated by some integrals."""
     now, before = seen(), seen(STEP)
 
     def loop(index: Array, chance: Chance) -> Reservoirs:
-        Y, source = initial(Pixels(before, index), chance), index + STEP
-        source = np.where(index % SIDE + STEP < SIDE, source, NOWHERE)
-        return temporal(initial(Pixels(now, index), chance), Pixels(now, index), Y, [Pixels(rated, source)], chance)
+        here, Y = Pixels(now, index), initial(Pixels(before, index), chance)
+        return temporal(initial(here, chance), here, Y, [Pixels(rated, index)], chance)
 
     return loop
 
@@ -183,8 +190,9 @@ def both_of(bug: TransportBug) -> tuple[Array, Array]:
     if "camera" in bug.name:
         history = scattered(bug.wrong(seen().tracer))
         return tuple(rendered(moving(of), seen()) for of in (seen(STEP), history))  # type: ignore[return-value]
-    wrong = scattered(bug.wrong(seen().tracer))
-    right: Any = seen() if isinstance(wrong, PathIntegrals) else PathIntegrals(seen().tracer)
+    of = seen()
+    wrong = scattered(bug.wrong(of.tracer))
+    right: Any = of if isinstance(wrong, PathIntegrals) else PathIntegrals(of.tracer)
     return rendered(reusing(right), right), rendered(reusing(wrong), wrong)
 
 
@@ -199,9 +207,11 @@ def beside(right: Array, wrong: Array) -> Figure:
     bright = np.percentile(truth, 98)
     shown(axes[0], truth, "right", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
     shown(axes[1], found, "with the mistake", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
-    blurred = smooth(found - truth) / np.maximum(smooth(truth), 0.1 * truth.mean())
-    far = max(0.05, float(np.percentile(abs(blurred), 99)))
-    drawn = shown(axes[2], 100 * blurred, "difference (%)", vmin=-100 * far, vmax=100 * far, cmap="RdBu_r")
+    blurred = 100 * significant(wrong - right) / np.maximum(smooth(smooth(truth)), 0.1 * truth.mean())
+    sizes = abs(blurred[blurred != 0])
+    far = max(1.0, float(np.percentile(sizes, 97))) if len(sizes) else 1.0
+    title = "difference (%)" if len(sizes) else "none above the noise"
+    drawn = shown(axes[2], blurred, title, vmin=-far, vmax=far, cmap="RdBu_r")
     picture.colorbar(drawn, ax=axes[2], shrink=0.85)
     return picture
 
@@ -232,10 +242,21 @@ def shown(ax: Axes, image: Array, title: str, **look: Any) -> Any:
 
 
 def smooth(image: Array) -> Array:
-    """Means over 3 x 3 pixels, mirrored at the borders."""
-    padded = np.pad(image, 1, mode="edge")
-    rows = padded[:-2] + padded[1:-1] + padded[2:]
-    return np.asarray((rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]) / 9)
+    """Means over 3 x 3 pixels, those at the borders repeated; (.., rows, columns)."""
+    padded = np.pad(image, [(0, 0)] * (image.ndim - 2) + [(1, 1)] * 2, mode="edge")
+    rows = padded[..., :-2, :] + padded[..., 1:-1, :] + padded[..., 2:, :]
+    return np.asarray((rows[..., :-2] + rows[..., 1:-1] + rows[..., 2:]) / 9)
+
+
+SURE = 3
+"""Standard errors by which a difference has to be off 0 to be shown."""
+
+
+def significant(difference: Array) -> Array:
+    """The mean of differences (images, rows, columns) over images and 5 x 5 pixels, 0 where it may be noise."""
+    each = smooth(smooth(difference))
+    mean, error = each.mean(axis=0), each.std(axis=0, ddof=1) / np.sqrt(len(each))
+    return np.asarray(np.where(abs(mean) > SURE * error, mean, 0))
 
 
 def exact(bug: Bug) -> Figure:
@@ -252,6 +273,19 @@ def exact(bug: Bug) -> Figure:
     return picture
 
 
+def exact_noise(bug: Bug) -> Figure:
+    """The exact standard deviation of every pixel of the mistake's own scene, right and wrong."""
+    scene = bug.scene()
+    picture = Figure(figsize=(6.6, 2.2), layout="constrained")
+    ax = picture.subplots()
+    for k, (name, loop) in enumerate({"right": bug.right(scene), "with the mistake": bug.wrong(scene)}.items()):
+        found = np.sqrt(statistics(loop, scene).variance(scene.p_hat))
+        ax.bar(np.arange(len(found)) + 0.4 * k - 0.2, found, 0.38, color=style.COLOURS[3 * k], label=name)
+    ax.set(xlabel="pixel", ylabel="standard deviation", xticks=np.arange(len(scene.v)))
+    picture.legend(loc="outside right upper")
+    return picture
+
+
 def picture_of(name: str) -> tuple[Figure, str]:
     """A mistake's picture, and its kind: "planted" or "exact"."""
     if name in TRANSPORT_BUGS:
@@ -260,7 +294,7 @@ def picture_of(name: str) -> tuple[Figure, str]:
     try:
         images = both(bug)
     except (AttributeError, TypeError, IndexError):
-        return exact(bug), "exact"
+        return (exact if name in BUGS else exact_noise)(bug), "exact"
     return (beside if name in BUGS else noise_beside)(*images), "planted"
 
 

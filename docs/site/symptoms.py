@@ -9,8 +9,12 @@ HERE, FOLDER = "symptoms.html", "symptoms"
 PLANTED = re.compile(r"^\| (?P<symptom>[^|]+) \| \*\*(?P<name>[^|*]+)\*\* \|", re.MULTILINE)
 SAID = (
     "The pictures: fluence of a room in flatland, 240 images averaged, rendered by the loop of the zoo with the "
-    "mistake in it and without. Where a mistake is made of a table of cells, the picture is the exact bias of each "
-    "cell of its own small scene. They are drawn by `python -m docs.site.planted`."
+    "mistake in it and without; lines are walls. A difference is shown where it is more than three standard errors. "
+    "They are of one room and a pass or two, so the sizes are not those of the tables, and what this room does not "
+    "show may still be seen in another. The mistake about the previous frame has its right box move to the right. "
+    "What is only noisier is shown by one image of each, and the ratio of their noise. Where a mistake is made of a "
+    "table of cells, or of what a renderer has no place for, the picture is exact, of its own small scene: the bias of "
+    "every cell, or the standard deviation of every pixel. They are drawn by `python -m docs.site.planted`."
 )
 
 

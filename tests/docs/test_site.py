@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from docs.site import api, check, code, evidence, gallery, layout, planted, stage, symptoms, words
+from figures.report.glossary import PAPERS
 from restir_ref import Live, Pixels, initial
 from restir_ref.oracle.zoo import BUGS, INEFFICIENT
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
@@ -66,6 +67,12 @@ def test_every_claim_and_every_figure_of_the_ledger_is_told(staged) -> None:
             assert each["verdict"] in staged[f"figures/{id_}.rst"]
 
 
+def test_a_test_that_shows_several_parts_of_a_claim_is_listed_once_with_all_of_them() -> None:
+    listed = [line for line in gallery.tests("DDGIR-E06", "claims/DDGIR.html") if "albedo" in line]
+    assert len(listed) == 1
+    assert listed[0].endswith(" (every lobe, by quadrature; flatland2d, tracer3d)")
+
+
 def test_a_figure_without_a_picture_says_what_to_run(monkeypatch) -> None:
     monkeypatch.setattr(gallery, "picture", lambda id_: None)
     page = "\n".join(gallery.page(gallery.entries()["GRIS-F07"]))
@@ -74,13 +81,14 @@ def test_a_figure_without_a_picture_says_what_to_run(monkeypatch) -> None:
 
 
 def test_every_erratum_names_what_shows_it(staged) -> None:
-    """Or that nothing does yet: the section on probes."""
-    before, _, probes = staged["errata.md"].partition("## DDGIR")
-    told = [part for part in re.split(r"^### ", before, flags=re.MULTILINE)[1:] if "*Printed*" in part]
-    assert len(told) >= 12
+    told = [part for part in re.split(r"^### ", staged["errata.md"], flags=re.MULTILINE)[1:] if "*Printed*" in part]
+    assert len(told) >= 18
     for part in told:
         assert re.search(r'<a href="(code/tests|claims)/', part), part.partition("\n")[0]
-    assert "nothing" in probes
+
+
+def test_every_paper_has_its_errata(staged) -> None:
+    assert set(re.findall("^## (.+)$", staged["errata.md"], re.MULTILINE)) == set(PAPERS) - {"COM"}
 
 
 # ---------------------------------------------------------------- words
@@ -156,11 +164,14 @@ def test_the_worst_z_is_of_rows_that_ask_for_a_small_one() -> None:
 MISTAKES = (*BUGS, *INEFFICIENT, *TRANSPORT_BUGS)
 
 
-def test_every_picture_of_a_mistake_is_small_and_on_the_page_of_symptoms() -> None:
-    page, files = symptoms.page(), {symptoms.slug(name): symptoms.file(name) for name in MISTAKES}
-    for path in (ROOT / "docs" / "symptoms").glob("*.png"):
-        assert path.stat().st_size < 60_000
-        assert f"]({files[path.stem]})" in page
+def test_every_mistake_of_the_zoo_has_a_small_picture_on_the_page_of_symptoms() -> None:
+    page, folder = symptoms.page(), ROOT / "docs" / "symptoms"
+    wanted = {symptoms.slug(name): symptoms.file(name) for name in MISTAKES}
+    assert len(wanted) == len(MISTAKES)
+    assert {file.stem for file in folder.iterdir()} == wanted.keys()
+    for name, file in wanted.items():
+        assert (folder / f"{name}.png").stat().st_size < 60_000
+        assert page.count(f"]({file})") == 1, name
 
 
 def few(monkeypatch) -> None:
@@ -184,6 +195,21 @@ def test_a_mistake_in_a_shift_is_planted_above_the_shift_of_paths(monkeypatch) -
     J = wrong.of.shift(X.x, near.index, Pixels(wrong.of, here.index)).J
     assert set(wrong.shift(X.x, near.index, here).J) == {0.0, 1.0}
     assert len(set(J)) > 2
+
+
+def test_a_difference_is_shown_where_it_is_more_than_noise() -> None:
+    """Three standard errors of a normal variable: by chance in one place of 370; neighbours are not independent."""
+    noise = np.random.default_rng(1).normal(size=(200, 40, 40))
+    assert (planted.significant(noise) != 0).mean() < 0.02
+    there = planted.significant(noise + np.repeat([0.0, 1.0], 20))
+    assert (there[:, :18] != 0).mean() < 0.02
+    assert (abs(there[:, 22:] - 1) < 0.2).all()
+
+
+def test_the_room_whose_box_moves_is_the_same_room_where_it_stands() -> None:
+    now, before = planted.room().scene.corners, planted.standing(planted.STEP).corners
+    assert (planted.standing(0).corners == now).all()
+    assert (before != now).any(axis=(0, 1)).sum() == 4
 
 
 def test_a_mistake_that_is_made_of_cells_has_the_exact_picture_of_its_scene(monkeypatch) -> None:
@@ -217,6 +243,13 @@ def test_styles_and_scripts_that_fetch_are_noticed(tmp_path) -> None:
 def test_links_for_people_and_files_of_the_site_are_no_requests(tmp_path) -> None:
     text = '<a href="https://doi.org/10.1145/1">doi</a><img src="x.png"><script src="x.js"></script>'
     assert check.requests(plant(tmp_path, "page.html", text)) == []
+
+
+def test_a_function_of_the_very_name_is_found_first_then_names_and_words(tmp_path) -> None:
+    objects = '{"a": [[1, 0, 1, "", "like_pairs"]], "b": [[0, 0, 1, "", "pairs"]]}'
+    text = f'Search.setIndex({{"docnames": ["b", "a", "c"], "terms": {{"pair": [0, 2]}}, "objects": {objects}}})'
+    plant(tmp_path, "searchindex.js", text)
+    assert check.searched(tmp_path, "pairs") == ["b", "a", "c"]
 
 
 @pytest.mark.parametrize("url", ["gone.html", "page.html#gone", "#gone", "x.png", "../page.html"])

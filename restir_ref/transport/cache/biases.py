@@ -29,5 +29,5 @@ def view_path(o: Array, distance: Array | float, length: Array) -> Array:
     o (d, N) unit direction to the viewer;  distance and length (N,) of the segment, scene units.
     """
     # erratum: moved by a fixed distance, the query is "guaranteed to not penetrate surfaces" only on the segment,
-    # hence the minimum; test_biases.py shows both.
+    # hence the minimum; tests/flatland/test_probe_rooms.py shows both.
     return np.asarray(o * np.minimum(distance, length * (1 - KEPT)))
