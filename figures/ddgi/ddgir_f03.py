@@ -124,7 +124,8 @@ def slopes(h: Array, error: Array) -> Array:
 
 
 GLASS = (
-    " Of light through the glass probes hold only what the glass itself is told, filtered by a cosine: a caustic is not "
+    " Of light through the glass probes hold only what the glass itself is told, filtered by a cosine: a "
+    "caustic is not "
     "there at any spacing."
 )
 
@@ -186,7 +187,7 @@ def draw(a: Arrays) -> "Picture":
     return picture
 
 
-def draw_row(axis: "Axes", a: Arrays, name: str, where: str, place: str) -> None:
+def draw_row(axis: "Axes", a: Arrays, name: str, where: str, place: Any) -> None:
     """Mean of the replicas; the region is marked."""
     key = f"{name} {float(a['per unit']):g}"
     inside = a[f"{key} inside"].mean(axis=0) > 0.5
