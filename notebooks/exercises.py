@@ -308,6 +308,32 @@ def mutation(mine: Step, K: int = 6) -> str:
     return right("p_hat is kept, and so is what the pixel itself shows.")
 
 
+# ---------------------------------------------------------------- 09: what a probe sees
+
+Visibility = Callable[[Array, Array, Array], Array]
+
+
+def visibility(mine: Visibility, N: int = 400) -> str:
+    """Whether mine(v, r1, r2) is the most that two moments allow for P(r >= v), for distances of any law.
+
+    Chebyshev's one-sided bound: var / (var + (v - r1)^2) beyond the mean, which two distances reach.
+    """
+    rng = np.random.default_rng(SEED)
+    near, step, share = rng.random((3, N)) * np.array([[1.0], [1.0], [0.8]]) + np.array([[0.1], [0.1], [0.1]])
+    far = near + step
+    r1, r2 = share * near + (1 - share) * far, share * near**2 + (1 - share) * far**2
+    found = np.asarray(mine(far, r1, r2), dtype=float)
+    if found.shape != (N,):
+        raise ValueError(f"return visibilities, an array of shape ({N},), not of shape {found.shape}.")
+    if not (found >= 1 - share - 1e-9).all():
+        return not_yet("a probe sees as far as v in more directions than you say: light would be lost.")
+    if not (found <= 1 - share + 1e-9).all():
+        return not_yet("two moments allow no more than var / (var + (v - r1)^2) beyond the mean: light leaks.")
+    if not (np.asarray(mine(near, r1, r2)) == 1).all():
+        return not_yet("what is nearer than the mean distance may be seen for certain.")
+    return right("no law of distances with these moments sees farther.")
+
+
 CHECKS: Mapping[str, Callable[[Any], str]] = {
     check.__name__: check
     for check in (
@@ -321,6 +347,7 @@ CHECKS: Mapping[str, Callable[[Any], str]] = {
         motion_vector,
         positivized,
         mutation,
+        visibility,
     )
 }
 """All checks by name."""

@@ -33,7 +33,7 @@ INDEX = """# The notebooks, run
 
 <!-- made by `make notebook-pages` -->
 
-Eight lessons with all that they show, to read here. To work with them, `make notebooks`: there the pictures
+Nine lessons with all that they show, to read here. To work with them, `make notebooks`: there the pictures
 have controls, and you write parts of ReSTIR yourself."""
 
 FENCED = re.compile(r"(```python\n.*?\n```)", re.DOTALL)

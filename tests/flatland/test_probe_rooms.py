@@ -16,7 +16,7 @@ from restir_ref.transport.cache.biases import self_shadow, view_path
 from restir_ref.transport.cache.converge import converge
 from restir_ref.transport.cache.rules import AUGMENTED, ORIGINAL
 from restir_ref.transport.cache.update import Updating
-from restir_ref.transport.cache.volume import Volume, Weighting, unlit
+from restir_ref.transport.cache.volume import Volume, Weighting, chebyshev, unlit
 from restir_ref.transport.lobes import LOBES
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.rays import arrive
@@ -115,25 +115,45 @@ def test_in_a_room_original_probes_and_direct_light_make_all_that_is_scattered()
     np.testing.assert_allclose(recovered, t.T @ t.B, rtol=1e-8, atol=1e-12)
 
 
-def leaked(**weights) -> float:
+def all_seen(v: Array, r1: Array, r2: Array) -> Array:
+    """A mistake: every probe is thought to see every point."""
+    return np.ones_like(v)
+
+
+def swapped(v: Array, r1: Array, r2: Array) -> Array:
+    """A mistake: r^2 where r stands."""
+    return chebyshev(v, r2, r1)
+
+
+def unwrapped(cos: Array) -> Array:
+    """A mistake: probes behind a surface count as those in front of it."""
+    return np.ones_like(cos)
+
+
+@cache
+def leaked(**weights: Callable[..., Array]) -> float:
     """Mean E on the walls of a room in which there is no light."""
     setting = sunlit(lamp=0.0)
     v, o, _ = seen(setting.scene, 4000)
-    volume = light(setting, 8, replace(PLAIN, rays=128), **weights)
+    volume = light(setting, 8, PLAIN, 0.02, **weights)
     return float(volume.irradiance(v.x, v.n, v.n, self_shadow(v.n, o, volume.spacing)).mean())
 
 
 @pytest.mark.claims("DDGIR-A01", part="leak through a thin wall")
 def test_visibility_keeps_all_but_a_tenth_of_the_light_that_leaks():
     """3 % of it are left at 8 probes per unit."""
-    leaking = leaked(visibility=lambda v, r1, r2: np.ones_like(v))
+    leaking = leaked(visibility=all_seen)
     assert leaking > 0.5
     assert 0 < leaked() / leaking < 0.1
 
 
+def test_moments_that_are_swapped_let_light_leak():
+    """A mistake: the mean square of the distance read where its mean stands."""
+    assert leaked(visibility=swapped) > 0.1 * leaked(visibility=all_seen)
+
+
 def test_the_wrap_weight_halves_what_leaks_without_visibility():
-    free = {"visibility": lambda v, r1, r2: np.ones_like(v)}
-    assert leaked(**free) < 0.6 * leaked(wrap=np.ones_like, **free)
+    assert leaked(visibility=all_seen) < 0.6 * leaked(visibility=all_seen, wrap=unwrapped)
 
 
 def separated(setting: Setting, per_unit: float) -> dict[str, float]:

@@ -94,6 +94,12 @@ WRONG = {
         "W inverted": ("W * p_hat / p_hat_new", "W * p_hat_new / p_hat"),
         "nothing moves": ("np.minimum(1,", "0 * np.minimum(1,"),
     },
+    "visibility": {
+        "moments swapped": ("r2 - r1**2", "abs(r1 - r2**2)"),
+        "no square": ("(v - r1) ** 2", "(v - r1)"),
+        "both sides": ("np.where(v <= r1, 1.0, bound)", "bound"),
+        "the standard deviation": ("bound = var /", "bound = var**0.5 /"),
+    },
 }
 
 
@@ -114,6 +120,7 @@ NO_NUMBERS = {
     "motion_vector": lambda x, before: np.nan * x[0],
     "positivized": lambda d: (np.nan * d[0],) * 3,
     "mutation": lambda p_hat, p_hat_new, T, W: (np.nan * T, W),
+    "visibility": lambda v, r1, r2: np.nan * v,
 }
 
 

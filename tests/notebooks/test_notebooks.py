@@ -49,8 +49,8 @@ def run(path):
 every_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 
 
-def test_there_are_eight_notebooks_in_order():
-    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_", "06_", "07_", "08_"]
+def test_there_are_nine_notebooks_in_order():
+    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_", "06_", "07_", "08_", "09_"]
 
 
 @every_notebook
@@ -149,3 +149,22 @@ def test_why_blotches_dissolve_tells_the_truth():
     assert names["kept"].energy < 1e-7
     assert names["kept"].moved > 0.1
     assert "e' - e" in printed
+
+
+def test_what_a_probe_knows_tells_the_truth():
+    names, printed = run(NOTEBOOKS[8])
+    lesson = names["lesson"]
+    free, corner = (lesson.asked("sunlit", x).rows for x in (0.03, 0.005))
+    shares = [[(float(share), sees) for _, _, _, _, share, _, sees in rows] for rows in (free, corner)]
+    assert sum(share for share, sees in shares[0] if sees == "no") < 0.05
+    assert sum(share for share, sees in shares[1] if sees == "no") > 0.2
+    inside, beside = (lesson.irradiance("sunlit", x) for x in (0.03, 0.005))
+    assert beside > 5 * inside
+    leaks = {name: float(share.split()[0]) for name, share, _ in lesson.leaking("sunlit").rows}
+    assert leaks["without visibility"] > 3 * leaks["as it is"] > 0
+    assert "bounces" in printed
+    assert abs(names["after"][1] / names["after"][0] - 1) > 0.2
+    assert abs(names["after"][-1] / names["after"][-2] - 1) < 0.1
+    errors = list(names["errors"].values())
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] > 0.05

@@ -44,7 +44,7 @@ def test_a_lamp_near_probes_lights_too_much_unless_its_light_is_attenuated():
     o = s.space.to_world(v.n, v.o)
     found = {}
     for scale in (0.0, 1.0):
-        how = Updating(lambda s, f, v, r, chance: np.zeros((3, len(r))), rays=1500, attenuation=scale, hysteresis=0)
+        how = Updating(lambda s, f, v, r, chance: np.zeros((3, len(r))), rays=1000, attenuation=scale, hysteresis=0)
         empty, chance = unlit(s, probes(lamp_beside_probe(), 4), MAPS), live(3)
         E = np.mean([update(empty, s, how, chance).E for _ in range(4)], axis=0)
         filled = replace(update(empty, s, how, chance), E=E)

@@ -4,13 +4,13 @@
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
-from restir_ref.transport import materials as mat
+from restir_ref.transport.cache.leaving import telling, undisplaced
 from restir_ref.transport.cache.update import Updating, update
-from restir_ref.transport.lobes import KINDS
 from restir_ref.transport.materials import Layer, Material, Vertex, evaluate_lobe
 from restir_ref.transport.rays import arrive
 from restir_ref.transport.scene import scene
@@ -31,20 +31,6 @@ MATERIALS = {
 EVEN = ("lambert", "mirror", "glass")
 """Materials that scatter the same share of light whatever its direction; all worlds can sample them."""
 CASES = [(world, name) for name in MATERIALS for world in (WORLDS if name in EVEN else SEEING)]
-
-
-def one_lobe(s, field, v, r, chance):
-    """L+ by one sample of one lobe: rho / C_d E+(x, n) if it is Lambert's, else f |cos| / p E+(x, w_i) / C_d."""
-    t, space = s.materials, s.space
-    P = mat.lobe_shares(t, v)
-    lobe = mat.choose_lobe(P, chance.uniform((len(r),)))
-    i = mat.sample_lobe(t, space, v, lobe, chance.uniform((space.d - 1, len(r))))
-    lost = i[-1] == 0
-    i[-1] = np.where(lost, 1.0, i[-1])
-    weight, _, _ = mat.scatter_lobe(t, space, v, P, lobe, i)
-    lambert = t.kind.take(v.material * t.L + lobe) == KINDS.index("lambert")
-    w = np.where(lambert, v.n, space.to_world(v.n, i))
-    return np.where(lost, 0.0, weight) * field.irradiance(v.x, v.n, w, 0 * v.x) / ball_volume(space.d)
 
 
 def furnished(world, name):
@@ -71,17 +57,19 @@ def scattered_share(s, cos):
     return np.array(found)
 
 
+@cache
 def kept(world, name):
     """E / C_d of a probe in a furnace of radiance 1, less what is emitted; its mean over texels and frames."""
-    s, times = furnished(world, name), 80 if name == "ggx" else 10
+    s, times = furnished(world, name), 60 if name == "ggx" else 10
     v = volume(world, s)
     v = replace(v, E=v.E + ball_volume(v.grid.d))
-    how = Updating(one_lobe, rays=200, hysteresis=0.0, attenuation=0.0)
+    how = Updating(telling(undisplaced), rays=200, hysteresis=0.0, attenuation=0.0)
     chance = live(1)
     E = np.stack([update(v, s, how, chance).E for _ in range(times)]) / ball_volume(v.grid.d) - EMITTED
     return E.mean(), E.mean(axis=(1, 2, 3)).std() / np.sqrt(times)
 
 
+@cache
 def expected(world, name):
     """The mean over a probe's directions of what walls scatter back along them."""
     s = furnished(world, name)

@@ -101,7 +101,7 @@ def blended_by_fifth_roots(rays) -> float:
     s = open_room().scene
     v = unlit(s, probes(open_room(), 4), replace(MAPS, rays=rays))
     how, chance = Updating(attenuation=0, leaving=nothing, hysteresis=0), live(3)
-    frames = np.stack([update(v, s, how, chance).E for _ in range(300)])
+    frames = np.stack([update(v, s, how, chance).E for _ in range(150)])
     return float(((frames ** (1 / 5)).mean(axis=0) ** 5).sum() / frames.mean(axis=0).sum() - 1)
 
 
@@ -205,7 +205,7 @@ def at_the_floor(name, spacing, attenuation, size=SMALL):
     """E+ at 0 from one probe between floor and lamp; direct light alone."""
     s, axis = under_a_lamp(name, size)
     v = unlit(s, Grid(tuple((PROBE * axis[:, 0]).tolist()), (spacing,) * len(axis), (1,) * len(axis)), WORLDS[name][1])
-    how, chance = Updating(nothing, rays=4000, attenuation=attenuation, hysteresis=0), live(7)
+    how, chance = Updating(nothing, rays=2000, attenuation=attenuation, hysteresis=0), live(7)
     E = np.mean([update(v, s, how, chance).E for _ in range(10)], axis=0)
     return float(replace(v, E=E).irradiance(0 * axis, axis, axis, 0 * axis)[0, 0])
 
