@@ -17,6 +17,7 @@ from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments.cached import PLACES, RESAMPLED, SHADING, Bill, Chain, Scenery, frozen, scenery
 from figures.experiments.deep import truth, truth_of_trees
 from figures.experiments.rendering import means
+from figures.experiments.withheld import withheld_where
 from figures.report import style
 from flatland2d.probe_cells import Sectors
 from restir_ref.batch import Array
@@ -128,6 +129,19 @@ def at_equal_rays(a: Arrays) -> tuple[Array, int]:
     return means(a["images"][COLD], T), T
 
 
+DISPUTED = (
+    (
+        "DDGIR-C05",
+        "guided / BSDF",
+        (
+            "Sec. 5.1 says that guiding is too slow to pay, not by how much it helps; with 32 probes per "
+            "unit the ratio is .89, in FS5 .61."
+        ),
+    ),
+)
+"""What a critic with the paper at hand holds to be the experiment's fault."""
+
+
 def check(a: Arrays) -> list[Claim]:
     """Variances, bias, and what is left after the box."""
     images = a["images"]
@@ -139,13 +153,14 @@ def check(a: Arrays) -> list[Claim]:
         parts += [("DDGIR-C07", each) for each in ("variance, resampled / ReSTIR GI", "bias")]
         return [*(Claim(id_, None, part, reason=reason) for id_, part in parts), *check_boxes(a)]
     V = [squares(each) for each in images]
-    return [
+    every = [
         Claim("DDGIR-C05", criteria.ratio_below(V[GUIDED], V[BY_BSDF], 0.9), "guided / BSDF", reason=ELSEWHERE),
         smaller(V[COLD], V[GUIDED], 1, "resampled / guided, cold"),
         smaller(V[WARM], V[GUIDED], 1, "resampled / guided, warm"),
         *check_gi(a),
         *check_boxes(a),
     ]
+    return withheld_where(every, DISPUTED)
 
 
 def smaller(x: Array, y: Array, limit: float, part: str) -> Claim:
