@@ -24,6 +24,7 @@ from figures.experiments.volumes import (
     view,
     volume,
 )
+from figures.experiments.withheld import withheld_where
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Live
@@ -92,6 +93,20 @@ REASONS: Mapping[str, str] = {
 }
 
 
+DISPUTED = (
+    (
+        "DDGIR-F05",
+        "leak energy",
+        (
+            "queries leak here without any displacement, so that Chebyshev's test of walls without "
+            "thickness is measured; on walls of .4 spacings the ratio is .10 and .14, at other spacings "
+            ".25."
+        ),
+    ),
+)
+"""What a critic with the paper at hand holds to be the experiment's fault."""
+
+
 def check(a: Arrays) -> list[Claim]:
     """Leak energy along the path over that off the surface, at the middle spacing; biases beside it."""
     found, h = [], a["spacings"][len(a["spacings"]) // 2]
@@ -107,7 +122,7 @@ def check(a: Arrays) -> list[Claim]:
         found.append(Claim("DDGIR-F05", criteria.reported(", ".join(by_way)), f"{name}, bias of the image"))
         moved = [f"{way} {100 * a[f'{key} {way} through'].mean():.2g} %" for way in WAYS]
         found.append(Claim("DDGIR-F05", criteria.reported(", ".join(moved)), f"{name}, queries through a surface"))
-    return found
+    return withheld_where(found, DISPUTED)
 
 
 def draw(a: Arrays) -> "Picture":
