@@ -18,9 +18,16 @@ PRINTED, OURS, NARROW = 1.0, 100.0, 1000.0
 """As printed; and connections shorter than a tenth of a room's height, or a thirtieth."""
 
 
+NO_FIREFLIES = (
+    "DDGIR-F06",
+    "in the crease",
+    "without a bound the variance of this crop is a hundredth of its mean squared: it holds no fireflies to remove.",
+)
+
+
 def check(a: Arrays) -> list[Claim]:
     """The same ratios."""
-    return withheld_where(of_fireflies(a, (PRINTED, OURS, NARROW)), DISPUTED)
+    return withheld_where(of_fireflies(a, (PRINTED, OURS, NARROW)), (*DISPUTED, NO_FIREFLIES))
 
 
 def draw(a: Arrays) -> "Picture":
