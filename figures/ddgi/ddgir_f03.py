@@ -222,21 +222,22 @@ def sharper(a: Arrays, name: str) -> list[Claim]:
 def draw(a: Arrays) -> "Picture":
     """Rows of pixels of two rooms; bias over spacing of two."""
     picture, axes = style.panels(2, 2, width=4.4, height=3.1)
-    draw_row(axes[0, 0], a, "FS11", "corner by the sunny wall", "center left")
-    draw_row(axes[0, 1], a, "FS4", "below the furniture", "lower left")
+    draw_row(axes[0, 0], a, "FS11", "corner by the sunny wall", ("upper left", 1.9))
+    draw_row(axes[0, 1], a, "FS4", "below the furniture", ("lower left", 1.0))
     for axis, name in ((axes[1, 0], "FS4"), (axes[1, 1], CAUSTIC)):
         draw_errors(axis, a, name)
     return picture
 
 
-def draw_row(axis: "Axes", a: Arrays, name: str, where: str, place: Any) -> None:
-    """Mean of the replicas; the region is marked."""
+def draw_row(axis: "Axes", a: Arrays, name: str, where: str, legend: tuple[Any, float]) -> None:
+    """Mean of the replicas; the region is marked.  The legend has a place (`loc`), and the axis room for it."""
     key = f"{name} {float(a['per unit']):g}"
     inside = a[f"{key} inside"].mean(axis=0) > 0.5
     for method in ("truth", "primary", "secondary"):
         axis.plot(a[f"{key} {method}"].mean(axis=0), **LOOKS[method])
     axis.plot(a[f"{key} {OFF}"].mean(axis=0), **style.nth(6, label=OFF))
-    high, pixel = axis.get_ylim()[1], np.arange(len(inside))
+    place, room = legend
+    high, pixel = room * axis.get_ylim()[1], np.arange(len(inside))
     axis.fill_between(pixel, 0, high, where=inside, color=style.PALE, lw=0, zorder=0, label=where)
     title = f"{name}, {float(a['per unit']):g} probes per unit"
     axis.set(xlabel="pixel", ylabel="indirect radiance", title=title, ylim=(0, high))
