@@ -204,7 +204,7 @@ FIGURE = Figure(
     ),
     arm="method",
     presets={
-        "quick": {"path tracing": 96, "cornell": 40, "glossy_cornell": 16, "truth": 1},
+        "quick": {"path tracing": 144, "cornell": 64, "glossy_cornell": 16, "truth": 1},
         "paper": {"path tracing": 1152, "cornell": 512, "glossy_cornell": 128, "truth": 4},
     },
     chunks=chunks,
