@@ -82,7 +82,7 @@ DISPUTED = (
         PARTS[1],
         (
             "attenuation is off, so that the augmented volume is too bright by itself (C02), and the "
-            "ratio moves with its tolerance, 1.13 to 1.40."
+            "ratio moves with its tolerance."
         ),
     ),
 )

@@ -133,10 +133,7 @@ DISPUTED = (
     (
         "DDGIR-C05",
         "guided / BSDF",
-        (
-            "Sec. 5.1 says that guiding is too slow to pay, not by how much it helps; with 32 probes per "
-            "unit the ratio is .89, in FS5 .61."
-        ),
+        "Sec. 5.1 says that guiding is too slow to pay, not by how much it helps.",
     ),
 )
 """What a critic with the paper at hand holds to be the experiment's fault."""

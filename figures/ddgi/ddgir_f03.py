@@ -167,7 +167,7 @@ DISPUTED = (
     (
         "DDGIR-F03",
         "FS4, total",
-        ("the ratio depends on the gap's height over the spacing, .31 to .84, always below 1."),
+        "the ratio depends on the gap's height over the spacing, which is still to be swept.",
     ),
     (
         "DDGIR-C10",

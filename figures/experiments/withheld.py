@@ -1,20 +1,20 @@
-"""Verdicts that are withheld: a criterion failed, and a reader with the paper at hand holds the experiment to blame.
+"""Parts without a verdict: a reader with the paper at hand holds the experiment unfit to judge them, either way.
 
-A part that passes stays as it is, so that nothing becomes better by being withheld.
+What is withheld is so whether it passes or fails: a part that could only pass would be no check.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from figures.claims.figure import Claim, verdict_of
+from figures.claims.figure import Claim
 
 
 def withheld(claim: Claim, why: str) -> Claim:
-    """The claim, not judged if it would be a negative verdict; what was measured, and why that is no judgement."""
-    if claim.outcome is None or verdict_of(claim) not in ("not reproduced", "refuted"):
+    """The claim, not judged; what was measured against which criterion, and why that is no judgement."""
+    if claim.outcome is None or claim.outcome.passed is None:
         return claim
     said = f"Measured {claim.outcome.measured}, asked {claim.outcome.criterion}; no verdict, for {why}"
-    return replace(claim, outcome=None, counter=None, reason=f"{said}  {claim.reason}".rstrip())
+    return replace(claim, outcome=None, counter=None, caveat="", reason=f"{said}  {claim.reason}".rstrip())
 
 
 def withheld_where(claims: Iterable[Claim], disputed: Sequence[tuple[str, str, str]]) -> list[Claim]:
