@@ -47,7 +47,7 @@ GRAIN = 2.0**-16
 UNIT = {"float32": 2.0**-24, "float64": 2.0**-53}
 """Relative error of one operation."""
 
-OPERATIONS = 128
+OPERATIONS = 64
 """So many roundings of inputs and results are allowed for."""
 
 
