@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from restir_ref.batch import Array, entry, take
+from restir_ref.batch import Array, entry, ratio, take
 from restir_ref.gradient import gap, omega
 from restir_ref.integrals import Pixels, Reservoirs, shifted
 from restir_ref.mis import WEIGHTS
@@ -157,42 +157,46 @@ def shifts(t: Tracer, x: Path, chosen: Chosen) -> Terms:
 
 def one_pass(t: Tracer, x: Path, chosen: Chosen) -> Terms:
     """Pairwise resampling of three base paths in the pixel of the first: the fields of a dump, and its terms."""
-    of, M = PathIntegrals(t), chosen.passes.shape[1]
-    rows = list(chosen.passes)
-    pixels = [chosen.pixel[chosen.path[row]] for row in rows]
-    here = Pixels(of, pixels[0])
-    inputs = []
-    for i, (row, pixel, c) in enumerate(zip(rows, pixels, CONFIDENCES, strict=True)):
-        X = take(x, row)
-        W = np.full(M, (i + 1) / 4)
-        inputs.append(Input(Reservoirs(X, W, np.full(M, c)), Pixels(of, pixel) if i else here))
-    landed = [(each.X.x, np.ones(M)) if each.at is here else _landed(each, here) for each in inputs]
-    p_hat, J = np.stack([of.target(here.index, y) for y, _ in landed]), np.stack([J for _, J in landed])
-    p_hat = np.where(J > 0, p_hat, 0)
-    found = list(weigh(inputs, here, WEIGHTS[MIS]))
-    w = np.stack([each.p_hat * each.mW for each in found])
-    W = np.stack([each.X.W for each in inputs])
+    inputs = _inputs(t, x, chosen)
+    here = inputs[0].at
+    landed = [_landed(each, here) for each in inputs]
+    J = np.stack([J for _, J in landed])
+    w = np.stack([each.p_hat * each.mW for each in weigh(inputs, here, WEIGHTS[MIS])])
+    p_hat = np.where(J > 0, np.stack([here.of.target(here.index, y) for y, _ in landed]), 0)
     u, s = middle(w)
-    w_sum, chosen_p_hat = w.sum(axis=0), entry(p_hat, s)
-    weight = np.divide(w_sum, chosen_p_hat, out=np.zeros(M), where=chosen_p_hat > 0)
+    w_sum = w.sum(axis=0)
     return {
         "mis": MIS,
         "canonical": [1, 0, 0],
-        "W": W,
+        "W": np.stack([each.X.W for each in inputs]),
         "c": np.stack([each.X.c for each in inputs]),
         "p_hat": p_hat,
         "J": J,
-        "p_hat_own": np.stack([of.target(each.at.index, each.X.x) for each in inputs]),
+        "p_hat_own": np.stack([each.at.of.target(each.at.index, each.X.x) for each in inputs]),
         "p_hat_from": np.stack([_from(y, J, here, inputs) for y, J in landed]),
         "u": u,
         "w": w,
         "w_sum": w_sum,
         "s": s,
-        "W_Y": weight,
+        "W_Y": ratio(w_sum, entry(p_hat, s)),
     }
 
 
+def _inputs(t: Tracer, x: Path, chosen: Chosen) -> list[Input]:
+    """Three base paths of every pass, each in its own pixel; W = 1/4, 1/2, 3/4."""
+    of, P = PathIntegrals(t), chosen.passes.shape[1]
+    return [
+        Input(
+            Reservoirs(take(x, row), np.full(P, (i + 1) / 4), np.full(P, c)), Pixels(of, chosen.pixel[chosen.path[row]])
+        )
+        for i, (row, c) in enumerate(zip(chosen.passes, CONFIDENCES, strict=True))
+    ]
+
+
 def _landed(source: Input, here: Pixels) -> tuple[Path, Array]:
+    """The path in the pixel of the pass, and J; the canonical one as it is."""
+    if source.at is here:
+        return source.X.x, np.ones(len(here.index))
     y = shifted(source.X.x, source.at, here)
     return y.x, y.J
 
@@ -209,7 +213,7 @@ def _from(y: Path, J: Array, here: Pixels, inputs: list[Input]) -> Array:
 def middle(w: Array) -> tuple[Array, Array]:
     """A number in the middle of the widest option's interval, a multiple of 2^-12, and the option; (N,) each."""
     whole = w.sum(axis=0)
-    share = np.divide(w, whole, out=np.zeros_like(w), where=whole > 0)
+    share = ratio(w, whole)
     s = share.argmax(axis=0)
     before = entry(np.cumsum(share, axis=0) - share, s)
     return np.floor((before + entry(share, s) / 2) * 2**12) / 2**12, s
