@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from restir_ref.audit.make_golden import text as lines
 from restir_ref.batch import Array, entry, take
 from restir_ref.chance import Chance, Live
 from restir_ref.transport.paths import Tracer, leaves, trace
@@ -228,23 +229,18 @@ def moved_by(sketch: Sketch, step: float, rng: np.random.Generator) -> Sketch:
 # ---------------------------------------------------------------- files
 
 
-def text(value: Any, indent: str = "") -> str:
-    """JSON with a line per field, arrays on one line each, numbers with 15 digits, or all if float32 has them."""
+def text(file: Mapping[str, Any]) -> str:
+    """JSON with a line per field; numbers with 15 digits, or all if float32 has them."""
+    return lines(_rounded(file))
+
+
+def _rounded(value: Any) -> Any:
     if isinstance(value, Mapping):
-        inner = indent + " "
-        lines = [f"{inner}{json.dumps(name)}: {text(each, inner)}" for name, each in value.items()]
-        return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
-    if isinstance(value, list) and value and isinstance(value[0], Mapping):
-        return "[\n" + ",\n".join(f"{indent} {text(each, indent + ' ')}" for each in value) + f"\n{indent}]"
-    return json.dumps(_short(value.tolist() if isinstance(value, np.ndarray) else value), separators=(",", ":"))
-
-
-def _short(value: Any) -> Any:
-    if isinstance(value, list | tuple):
-        return [_short(each) for each in value]
-    if isinstance(value, float):
-        exact = value.is_integer() and abs(value) < 2**53
-        return int(value) if exact else value if float(np.float32(value)) == value else float(f"{value:.15g}")
+        return {name: _rounded(each) for name, each in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_rounded(each) for each in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, float) and float(np.float32(value)) != value:
+        return float(f"{value:.15g}")
     return value
 
 
