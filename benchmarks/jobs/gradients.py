@@ -87,5 +87,6 @@ def judge(done: Done) -> Sequence[Row]:
     return rows
 
 
-CLAIMS, EPS = {"with": "GPT-A02, GPT-A05", "after": "GPT-A01, GPT-E11", "path tracing": "GPT-A12"}, 0.005
+CLAIMS = {"with": "GPT-A02, GPT-A05", "after": "GPT-A01, GPT-E11, COM-B07", "path tracing": "GPT-A12, COM-B06"}
+EPS = 0.005
 JOB = Job("Differences of a checker floor against those of its reference, by replicas", chunks, compute, judge)

@@ -15,7 +15,10 @@ Kind = Literal["tests", "figures", "evidence", "benchmark"]
 KINDS: tuple[Kind, ...] = ("tests", "figures", "evidence", "benchmark")
 EVIDENCE = "evidence.json"
 JOBS_WORLD = "flatland2d"
-"""The world of the evidence's jobs and of benchmarks with a row of the ledger."""
+"""The world of benchmarks with a row of the ledger, and of the evidence's jobs but those of SPACE."""
+
+SPACE, SPACE_WORLD = ("space", "witness"), "tracer3d"
+"""How the names of the evidence's jobs in space begin, and their world."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +45,15 @@ def showings(
         for id_ in entry.figure.claims:
             found[id_].append(Showing("figures", entry.figure.id, entry.figure.world))
     for id_, jobs in evidence_by_claim(benchmarks / EVIDENCE).items():
-        found.setdefault(id_, []).extend(Showing("evidence", job, JOBS_WORLD) for job in jobs)
+        found.setdefault(id_, []).extend(Showing("evidence", job, world_of(job)) for job in jobs)
     for id_, scripts in scan.benchmarks_by_claim(benchmarks).items():
         found.setdefault(id_, []).extend(Showing("benchmark", script, JOBS_WORLD) for script in scripts)
     return found
+
+
+def world_of(job: str) -> str:
+    """The world of a job of the evidence, which its name says."""
+    return SPACE_WORLD if job.startswith(SPACE) else JOBS_WORLD
 
 
 def evidence_by_claim(path: Path) -> dict[str, list[str]]:

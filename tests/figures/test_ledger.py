@@ -8,6 +8,7 @@ import pytest
 from figures.claims import ledger, scan
 from figures.claims.errors import FigureError
 from figures.claims.figure import PRESETS
+from figures.claims.showings import world_of
 from figures.engine import registry
 from figures.project import Project
 from tests.figures.project import claim, figures, project
@@ -232,6 +233,10 @@ def test_a_declared_claim_without_an_expected_verdict_is_listed(tmp_path):
 
 
 # ---------------------------------------------------------------- our own
+
+
+def test_evidence_shows_the_world_that_the_name_of_its_job_says():
+    assert [world_of(job) for job in ("means", "space gradients", "witness")] == ["flatland2d", "tracer3d", "tracer3d"]
 
 
 def test_our_own_figures_declare_claims_of_our_ledger_with_expected_verdicts():

@@ -22,6 +22,8 @@ from benchmarks.jobs import (
     report,
     retracing,
     roundtrips,
+    space_gradients,
+    space_offline,
 )
 from benchmarks.jobs import tracing as tracing_job
 from benchmarks.jobs.comparing import Sums, joined, judged, nothing, spread, spread_by_chance, stored, sums
@@ -29,7 +31,7 @@ from benchmarks.jobs.job import Job, Row, parts, run
 from benchmarks.jobs.references import lattice
 from benchmarks.jobs.roundtrips import Trips
 from flatland2d import SCENES
-from restir_ref.batch import take
+from restir_ref.batch import Array, take
 from restir_ref.integrals import Pixels
 from restir_ref.loop import random_in_row
 from restir_ref.transport import shifts as shifts_module
@@ -398,6 +400,47 @@ def test_baselines_run(name) -> None:
 def test_offline_frames_and_probes_run() -> None:
     assert offline.compute({"rule": "hybrid", "part": 0}, rng=np.random.default_rng(1))["frames"].shape == (8, 128)
     assert len(rows(probes.JOB, 0.001)) == 5 * len(probes.PROBES)
+
+
+def scattered(count: int, n: int, spread: float, seed: int) -> Array:
+    """Independent normal images of mean 1."""
+    return 1 + spread * np.random.default_rng(seed).standard_normal((count, n))
+
+
+def test_the_error_of_means_falls_like_one_over_their_number_whatever_the_truths_own() -> None:
+    frames, own = scattered(256, 400, 0.1, 1), np.full(400, 0.02)
+    blurred = scattered(1, 400, 0.02, 2)[0]
+    found = [offline.error(frames, comparing.Truth(blurred, own, 0.0), T) * T for T in (1, 64)]
+    assert found == pytest.approx([0.01, 0.01], rel=0.25)
+    blind = offline.error(frames, comparing.Truth(blurred, 0 * own, 0.0), 64) * 64
+    assert blind > 0.03
+
+
+RULES3 = (space_offline.TRUTH, "reconnection", "hybrid")
+
+
+def test_frames_in_space_are_judged_by_lattices_of_the_same_pixels(monkeypatch) -> None:
+    monkeypatch.setattr(space_offline, "LATTICES", 1)
+    monkeypatch.setattr(space_offline, "FRAMES", 2)
+    found = {rule: space_offline.compute({"rule": rule}, rng=np.random.default_rng(1))["frames"] for rule in RULES3}
+    right = found[space_offline.TRUTH].mean()
+    assert [images.mean() for images in found.values()] == pytest.approx([right] * 3, rel=0.05)
+    assert {params["rule"] for params in space_offline.chunks(0.01)} == {*RULES3}
+
+
+def test_differences_with_the_wrong_sign_or_size_turn_those_of_space_red(monkeypatch) -> None:
+    true = np.linspace(-1, 2, 72)
+    images = {m: [scattered(64, 72, 0.05, part) - 1 + true for part in range(32)] for m in space_gradients.CHUNKS}
+
+    def judged_with(method: str, factor: float) -> list[bool]:
+        done = [
+            ({"method": m}, {"dx": dx * (factor if m == method else 1)}) for m, each in images.items() for dx in each
+        ]
+        return [row.holds for row in space_gradients.judge(done)]
+
+    assert judged_with("with", 1) == [True, True, True]
+    assert judged_with("with", -1) == [False, True, True]
+    assert judged_with("after", 1.02) == [True, False, True]
 
 
 def test_probes_of_mutations_run_and_their_truth_is_theirs(monkeypatch) -> None:

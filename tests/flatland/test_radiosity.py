@@ -223,7 +223,7 @@ def path_traced(scene: str) -> Array:
 
 
 @pytest.mark.claims("GRIS-E49", part="all-Lambert scenes against radiosity")
-@pytest.mark.claims("COM-A01", "COM-B01")
+@pytest.mark.claims("COM-A01", "COM-B01", "MCMC-E01")
 @pytest.mark.parametrize("scene", BATCHES)
 def test_path_tracing_agrees_with_radiosity(scene) -> None:
     assert SCENES[scene]().depth == 3

@@ -295,6 +295,7 @@ def two_frames(of: TwoRays, mutation: Mutation, seed: int = 6) -> Reservoirs:
     return frame(here, chance, REAL_TIME, random_in_row, X, [here], passes=passes)
 
 
+@pytest.mark.claims("COM-B14", world="flatland2d")
 def test_without_mutations_the_frame_is_bit_for_bit_what_it_was() -> None:
     of = TwoRays(tracer("ajar"), STEP)
     here, chance = Pixels(of, np.arange(2 * of.n)), Live(np.random.default_rng(6))
