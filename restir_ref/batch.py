@@ -164,10 +164,12 @@ def rows(x: Block, name: str, which: slice) -> Array:
 
 
 def entries(x: Block, name: str, i: Array) -> Array:
-    """Row i[n] of a field (D, N) in column n: of a reference only these numbers are gathered, (N,)."""
+    """Row i[n] of a field (D, N) in every column n, (N,): of a reference only these numbers are gathered."""
+    if not is_reference(x) or name in x.__dict__:
+        return entry(getattr(x, name), i)
     of, index, _ = reference(x)
     stack: Array = getattr(of, name)
-    return stack.take(i * stack.shape[-1] + index)
+    return np.asarray(stack.take(i * stack.shape[-1] + index))
 
 
 def changed(x: Batch, **own: Any) -> Batch:
@@ -233,14 +235,16 @@ def put(batch: Batch, columns: Array, values: Batch) -> None:
 
 
 def pick(batches: Sequence[Batch], s: Array) -> Batch:
-    """Column n of batches[s[n]], gathered; s (N,) integers below len(batches)."""
-    chosen = [s == k for k in range(1, len(batches))]
+    """Column n of batches[s[n]], gathered; s (N,) integers below len(batches).
+
+    One `take` from leaves side by side: as fast as `where` for two of them, twice as fast for more.
+    """
+    n = len(s)
+    column = s.astype(int) * n + np.arange(n)
 
     def picked(*leaves: Array) -> Array:
-        out = np.broadcast_to(leaves[0], (*leaves[0].shape[:-1], len(s)))
-        for leaf, mask in zip(leaves[1:], chosen, strict=True):
-            out = np.where(mask, leaf, out)
-        return out
+        spread = [leaf if leaf.shape[-1:] == (n,) else np.broadcast_to(leaf, (*leaf.shape[:-1], n)) for leaf in leaves]
+        return np.concatenate(spread, axis=-1).take(column, axis=-1)
 
     def refer(*xs: Block) -> Block:
         (of, *others), index, own = zip(*map(reference, xs), strict=True)

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from restir_ref.batch import Array, Block, changed, part, pick, put, ratio, rows, take, total
+from restir_ref.batch import Array, changed, part, pick, put, ratio, rows, take, total
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import (
