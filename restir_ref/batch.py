@@ -33,7 +33,7 @@ class Block:
             """A field that nobody has read yet."""
             if "_of" not in self.__dict__ or name not in names(type(self)):
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            leaf = self.__dict__[name] = take(getattr(self._of, name), self._index)
+            leaf = self.__dict__[name] = _taken(getattr(self._of, name), self._index)
             return leaf
 
 
@@ -96,10 +96,15 @@ def take(batch: Batch, index: Array) -> Batch:
     array([0.3, 0.1])
     """
     columns(index)
+    return _taken(batch, index)
+
+
+def _taken(batch: Batch, index: Array) -> Batch:
+    """`take` of an index that is known to number columns."""
 
     def refer(x: Block) -> Block:
         of, at, own = reference(x)
-        return referring(of, at.take(index), {name: take(field, index) for name, field in own.items()})
+        return referring(of, at.take(index), {name: _taken(field, index) for name, field in own.items()})
 
     taken: Batch = map_leaves(lambda leaf: leaf.take(index, axis=-1), batch, refer=refer)
     return taken
@@ -149,13 +154,22 @@ def referring(of: Block, index: Array, own: Mapping[str, Any]) -> Block:
     return x
 
 
-def head(x: Block, name: str, rows: int) -> Array:
-    """The first rows of a field (.., N): of a reference only these are gathered."""
+def rows(x: Block, name: str, which: slice) -> Array:
+    """Some rows of a field (.., N): of a reference only these are gathered."""
     if not is_reference(x) or name in x.__dict__:
         leaf: Array = getattr(x, name)
-        return leaf[:rows]
+        return leaf[which]
     of, index, _ = reference(x)
-    return take(head(of, name, rows), index)
+    return _taken(rows(of, name, which), index)
+
+
+def entries(x: Block, name: str, i: Array) -> Array:
+    """Row i[n] of a field (D, N) in every column n, (N,): of a reference only these numbers are gathered."""
+    if not is_reference(x) or name in x.__dict__:
+        return entry(getattr(x, name), i)
+    of, index, _ = reference(x)
+    stack: Array = getattr(of, name)
+    return np.asarray(stack.take(i * stack.shape[-1] + index))
 
 
 def changed(x: Batch, **own: Any) -> Batch:
@@ -207,24 +221,30 @@ def where(mask: Array, a: Batch, b: Batch) -> Batch:
 
 
 def put(batch: Batch, columns: Array, values: Batch) -> None:
-    """Write values into columns (n,) of a batch whose memory is the caller's own."""
+    """Write values into columns (n,) of a batch whose memory is the caller's own.
+
+    Row by row: `leaf[..., columns] = anew` goes through the columns, and takes 4 times as long.
+    """
 
     def write(leaf: Array, anew: Array) -> Array:
-        leaf[..., columns] = anew
+        for row in np.ndindex(leaf.shape[:-1]):
+            leaf[row][columns] = anew[row]
         return leaf
 
     map_leaves(write, batch, values)
 
 
 def pick(batches: Sequence[Batch], s: Array) -> Batch:
-    """Column n of batches[s[n]], gathered; s (N,) integers below len(batches)."""
-    chosen = [s == k for k in range(1, len(batches))]
+    """Column n of batches[s[n]], gathered; s (N,) integers below len(batches).
+
+    One `take` from leaves side by side: as fast as `where` for two of them, twice as fast for more.
+    """
+    n = len(s)
+    column = s.astype(int) * n + np.arange(n)
 
     def picked(*leaves: Array) -> Array:
-        out = np.broadcast_to(leaves[0], (*leaves[0].shape[:-1], len(s)))
-        for leaf, mask in zip(leaves[1:], chosen, strict=True):
-            out = np.where(mask, leaf, out)
-        return out
+        spread = [leaf if leaf.shape[-1:] == (n,) else np.broadcast_to(leaf, (*leaf.shape[:-1], n)) for leaf in leaves]
+        return np.concatenate(spread, axis=-1).take(column, axis=-1)
 
     def refer(*xs: Block) -> Block:
         (of, *others), index, own = zip(*map(reference, xs), strict=True)

@@ -347,7 +347,7 @@ def _met(t: Tracer, y: FarPath, to: Landing, z_x: Vertex) -> tuple[Moved, Array]
 def _lit(t: Tracer, y: FarPath, to: Landing, z_x: Vertex) -> tuple[Moved, Array]:
     """Light sampling joins x_c to the light with the numbers that it has."""
     shares = mat.lobe_shares(t.scene.materials, to.z)
-    leaf, out = light_leaf(t, to.z, shares, t.light_numbers(y.u, y.k))
+    leaf, out = light_leaf(t, to.z, shares, t.end_numbers(y))
     moved = {"F": to.T * leaf.end, "A": to.A, "p_light": leaf.p_light, "S": leaf.bare, "out": out}
     return moved, np.ones_like(to.r)
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array, Block, entry, ratio, take
+from restir_ref.batch import Array, Block, entries, ratio, take
 from restir_ref.guards import whole
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
@@ -123,12 +123,20 @@ class Tracer:
         start, d = self._start(i), self.scene.space.d
         return u[start + 1 : start + d]
 
-    def light_numbers(self, u: Array, i: int | Array) -> tuple[Array, Array]:
-        """The numbers of light sampling at x_i: pick (N,), point (d-1, N); i may be an index for each column."""
+    def scatter_numbers(self, i: int) -> slice:
+        """Which rows of u choose the lobe and the direction at x_i."""
+        start = self._start(i)
+        return slice(start, start + self.scene.space.d)
+
+    def light_numbers(self, u: Array, i: int) -> tuple[Array, Array]:
+        """The numbers of light sampling at x_i: pick (N,), point (d-1, N)."""
         start, d = self._start(i), self.scene.space.d
-        if isinstance(start, int):
-            return u[start + d], u[start + d + 1 : start + 2 * d]
-        pick, *point = (entry(u, start + row) for row in range(d, 2 * d))
+        return u[start + d], u[start + d + 1 : start + 2 * d]
+
+    def end_numbers(self, x: "Path") -> tuple[Array, Array]:
+        """The same at each path's own last vertex x_k."""
+        start, d = self._start(x.k), self.scene.space.d
+        pick, *point = (entries(x, "u", start + row) for row in range(d, 2 * d))
         return pick, np.stack(point)
 
     def _start(self, i: Any) -> Any:
@@ -194,10 +202,15 @@ class Leaf:
 
 def scatter(t: Tracer, v: Vertex, u: Array, i: int) -> Scatter:
     """Sample one lobe and a direction at x_i; densities include the lobe's probability."""
+    return scatter_by(t, v, u[t.scatter_numbers(i)])
+
+
+def scatter_by(t: Tracer, v: Vertex, numbers: Array) -> Scatter:
+    """The same by the vertex's own numbers: of the lobe and of the direction, (d, N) together."""
     table, space = t.scene.materials, t.scene.space
     P = mat.lobe_shares(table, v)
-    lobe = mat.choose_lobe(P, t.lobe_number(u, i))
-    local = mat.sample_lobe(table, space, v, lobe, t.direction_numbers(u, i))
+    lobe = mat.choose_lobe(P, numbers[0])
+    local = mat.sample_lobe(table, space, v, lobe, numbers[1:])
     lost = local[-1] == 0
     local[-1] = np.where(lost, 1.0, local[-1])
     weight, p, p_all = mat.scatter_lobe(table, space, v, P, lobe, local)

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from restir_ref.batch import Array, changed, head, part, pick, put, ratio, take, total
+from restir_ref.batch import Array, changed, part, pick, put, ratio, rows, take, total
 from restir_ref.transport import materials as mat
 from restir_ref.transport.materials import Vertex
 from restir_ref.transport.paths import (
@@ -27,7 +27,7 @@ from restir_ref.transport.paths import (
     first_hit,
     hit_leaf,
     light_leaf,
-    scatter,
+    scatter_by,
 )
 from restir_ref.transport.rays import GRAZING, arrive, emitted, light_pdf, vertex
 from restir_ref.transport.vectors import norm
@@ -65,8 +65,7 @@ def shift_path(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
             here = slice(start, stop)
             F_y, A_y, legal = finish(t, *part((base, prefix), here))
             J_y = np.where(legal, ratio(A_y, base.A[here]), 0.0)
-            columns = order[here]
-            F[:, columns], A[columns], J[columns] = np.where(J_y > 0, F_y, 0.0), np.where(J_y > 0, A_y, 1.0), J_y
+            put((F, A, J), order[here], (np.where(J_y > 0, F_y, 0.0), np.where(J_y > 0, A_y, 1.0), J_y))
     return changed(x, F=F, A=A), J
 
 
@@ -76,7 +75,7 @@ def replay(t: Tracer, x: Path, pixel: Array) -> Prefix:
     Not illegal is what ends dark: a path onto a light that sends nothing this way is a path with F = 0.
     """
     s = np.where(x.c > 0, x.c - 1, np.where(x.nee, x.k, x.k + 1))
-    v, r, T = first_hit(t, head(x, "u", t.sensor.numbers), pixel)
+    v, r, T = first_hit(t, rows(x, "u", slice(t.sensor.numbers)), pixel)
     y = Prefix(v, r, np.zeros(len(s)), np.array(T), T.any(axis=0) | (x.k == 0))
     for i in range(1, int(s.max(initial=0))):
         columns = np.flatnonzero((s > i) & y.legal)
@@ -88,7 +87,7 @@ def replay(t: Tracer, x: Path, pixel: Array) -> Prefix:
 
 def _step(t: Tracer, x: Path, y: Prefix, i: int) -> Prefix:
     """From y_i to y_(i+1), and the test that they must not connect."""
-    at = scatter(t, y.v, x.u, i)
+    at = scatter_by(t, y.v, rows(x, "u", t.scatter_numbers(i)))
     v, r, met = arrive(t.scene, y.v.x, at.w)
     by_hit = (x.c == 0) & ~x.nee & (x.k == i)
     far = np.where(by_hit, 1.0, _roughness_of_y(t, x, v, i + 1)) if i < t.depth else np.ones(len(r))
@@ -100,7 +99,8 @@ def _step(t: Tracer, x: Path, y: Prefix, i: int) -> Prefix:
 def _roughness_of_y(t: Tracer, x: Path, v: Vertex, i: int) -> Array:
     """Roughness of y_i: of the lobe leaving it (copied by a reconnection), its roughest before light sampling."""
     table = t.scene.materials
-    lobe = np.where(x.c == i + 1, x.lobe_in, mat.choose_lobe(mat.lobe_shares(table, v), t.lobe_number(x.u, i)))
+    chosen = mat.choose_lobe(mat.lobe_shares(table, v), rows(x, "u", t.scatter_numbers(i))[0])
+    lobe = np.where(x.c == i + 1, x.lobe_in, chosen)
     by_light = (x.c == 0) & x.nee & (x.k == i)
     return np.where(by_light, mat.roughest(table, v), mat.lobe_roughness(table, v, lobe))
 
@@ -114,8 +114,8 @@ def _light_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     """Light sampling from y_k: F, A = 1, and whether it is legal."""
     F, legal = np.zeros_like(y.T), np.flatnonzero(y.legal)
     base, at = take((x, y), legal)
-    leaf, _ = light_leaf(t, at.v, mat.lobe_shares(t.scene.materials, at.v), t.light_numbers(base.u, base.k))
-    F[:, legal] = at.T * leaf.end
+    leaf, _ = light_leaf(t, at.v, mat.lobe_shares(t.scene.materials, at.v), t.end_numbers(base))
+    put(F, legal, at.T * leaf.end)
     return F, np.ones_like(y.r), y.legal
 
 

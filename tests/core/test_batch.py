@@ -79,6 +79,14 @@ def test_a_leaf_left_behind_is_noticed():
     assert not same(forgotten, right)
 
 
+def test_choices_may_be_bytes_however_many_columns_there_are():
+    s = np.arange(300, dtype=np.uint8) % 3
+    assert (
+        pick([np.arange(300) + 1000 * k for k in range(3)], s).tolist()
+        == (np.arange(300) + 1000 * s.astype(int)).tolist()
+    )
+
+
 def test_pick_spreads_leaves_that_all_columns_share():
     assert same(pick([np.array(2.0), np.array([3.0])], np.array([0, 1, 0])), np.array([2.0, 3.0, 2.0]))
 

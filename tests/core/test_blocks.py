@@ -12,8 +12,8 @@ from restir_ref.batch import (
     Array,
     Block,
     changed,
+    entries,
     gathered,
-    head,
     is_reference,
     joined,
     map_leaves,
@@ -21,6 +21,7 @@ from restir_ref.batch import (
     pick,
     put,
     reference,
+    rows,
     take,
     where,
 )
@@ -128,16 +129,28 @@ def test_only_what_is_read_is_gathered():
     assert x.k is x.k
 
 
-@pytest.mark.parametrize("rows", [0, 1, 3])
+@pytest.mark.parametrize("which", [slice(0), slice(1), slice(1, 3), slice(3)])
 @pytest.mark.parametrize("read", [False, True])
-def test_the_first_rows_can_be_read_alone(rows, read):
+def test_some_rows_can_be_read_alone(which, read):
     x = take(wide(1, 2, 3), np.array([2, 0]))
     if read:
         x.u  # noqa: B018
-    assert head(x, "u", rows).tolist() == wide(3, 1).u[:rows].tolist()
+    assert rows(x, "u", which).tolist() == wide(3, 1).u[which].tolist()
     assert ("u" in x.__dict__) == read
-    assert head(wide(3, 1), "u", rows).tolist() == wide(3, 1).u[:rows].tolist()
-    assert head(changed(x, u=x.u + 1), "u", rows).tolist() == (wide(3, 1).u[:rows] + 1).tolist()
+    assert rows(wide(3, 1), "u", which).tolist() == wide(3, 1).u[which].tolist()
+    assert rows(changed(x, u=x.u + 1), "u", which).tolist() == (wide(3, 1).u[which] + 1).tolist()
+
+
+@pytest.mark.parametrize("read", [False, True])
+def test_a_row_of_its_own_can_be_read_for_every_column(read):
+    x, i = take(wide(1, 2, 3), np.array([2, 0])), np.array([2, 1])
+    if read:
+        x.u  # noqa: B018
+    expected = wide(3, 1).u[i, [0, 1]]
+    assert entries(x, "u", i).tolist() == expected.tolist()
+    assert ("u" in x.__dict__) == read
+    assert entries(wide(3, 1), "u", i).tolist() == expected.tolist()
+    assert entries(changed(x, u=x.u + 1), "u", i).tolist() == (expected + 1).tolist()
 
 
 @pytest.mark.parametrize("name", ["v", "_of_", "__array__"])
