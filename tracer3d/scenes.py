@@ -200,6 +200,18 @@ def glass_ball() -> Setting:
     return Setting(inside, (0.5, 0.45, 0.95), (0.5, 0.1, 0.4), (928, 774), depth=5)
 
 
+def distant_caustic() -> Setting:
+    """Window3: a small glossy panel mirrors a small distant window onto the wall in view."""
+    shiny = Material([Layer("ggx", grey(0.95), 0.12)])
+    floor, ceiling, seen, front, right, back = walls(2.0)
+    panel = [(0.62, 0.0734, 0.56), (0.62, 0.0734, 0.44), (0.50, 0.0866, 0.44), (0.50, 0.0866, 0.56)]
+    window = [(1.995, 0.60, 0.47), (1.995, 0.60, 0.53), (1.995, 0.66, 0.53), (1.995, 0.66, 0.47)]
+    shell = [*joined([floor, ceiling, front, right, back], 0), *quad(seen, 1)]
+    facets = [*shell, *quad(panel, 2), *quad(window, 0, grey(80.0))]
+    inside = scene(SOLID, [matte(grey(0.2)), matte(grey(0.6)), shiny], facets)
+    return Setting(inside, (0.7, 0.6, 0.9), (0.0, 0.45, 0.5), (928, 508))
+
+
 def many_lights() -> Setting:
     """ManyLights3: 64 small lights above slats: direct light is the problem."""
     power = 4 + 36 * np.abs(np.sin(np.arange(64) * 2.4))
@@ -226,6 +238,7 @@ SCENES: Mapping[str, Callable[[], Setting]] = MappingProxyType(
             crease,
             furnace,
             glass_ball,
+            distant_caustic,
             many_lights,
         )
     }

@@ -185,6 +185,22 @@ def test_the_ball_of_glass_hangs_over_the_floor():
     assert s.materials.roughness[s.material[-1] * s.materials.L] == 0
 
 
+def test_the_window_is_mirrored_onto_the_middle_of_the_inset():
+    """By hand: the window's middle, mirrored by the panel's plane, is seen from the wall through the panel."""
+    setting = SCENES["distant_caustic"]()
+    mirror, window = (setting.scene.corners[:, :, part].mean(axis=(0, 2)) for part in (slice(12, 14), slice(14, 16)))
+    low, high = np.array([0.62, 0.0734]), np.array([0.50, 0.0866])
+    along = (high - low) / np.linalg.norm(high - low)
+    normal = np.array([along[1], -along[0]])
+    image = window[:2] - 2 * normal * (normal @ (window[:2] - low))
+    at = mirror[:2] + (mirror[:2] - image) * mirror[0] / (image[0] - mirror[0])
+    sensor = setting.pinhole(24, 24, (948, 528))
+    v, _, _ = arrive(setting.scene, *sensor.ray(np.arange(sensor.n), np.full((2, sensor.n), 0.5))[:2])
+    assert v.x[0] == pytest.approx(0, abs=1e-12)
+    assert at[0] == pytest.approx(0, abs=1e-12)
+    assert v.x[1].min() < at[1] < v.x[1].max()
+
+
 def test_64_lamps_are_behind_slats():
     s = SCENES["many_lights"]().scene
     assert len(s.lights.upto) == 128
@@ -236,6 +252,7 @@ DIGESTS = {
     "crease": "4351fe54",
     "furnace": "69abb2f5",
     "glass_ball": "ad1c39d9",
+    "distant_caustic": "88812ef6",
     "many_lights": "6d5118d1",
 }
 """Whoever changes a scene on purpose changes its digest, and makes its references and results anew."""
