@@ -50,7 +50,7 @@ FIGURE = Figure(
         "paper": {
             "room": ROOM,
             "bounds": [1, 9, 100, 1000],
-            "blocks": 1,
+            "blocks": 2,
             "replicas": 8,
             "groups": 8,
             "frames": 16,

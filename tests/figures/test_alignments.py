@@ -18,7 +18,6 @@ from figures.experiments.alignments import (
     scattered_twice,
     shifted,
 )
-from figures.experiments.creases import CROPS, NEAR, SIDE
 from figures.experiments.volumes import view
 from flatland2d.directions import MAPS
 from flatland2d.probe_rooms import couch, probes, sunlit, sunlit_slabs, wedge_of_slab
@@ -26,10 +25,6 @@ from flatland2d.scenes import crease
 from restir_ref.chance import Live
 from restir_ref.transport.cache.grid import Grid
 from restir_ref.transport.cache.walls import in_walls
-from restir_ref.transport.paths import RECONNECTION, Tracer, first_hit
-from restir_ref.transport.vectors import norm
-from tracer3d.scenes import crease as crease_in_space
-from tracer3d.sensors import Mosaic
 
 SMALL = {"pixels": 12, "rays": 16, "tolerance": 0.1}
 THICKNESS = 0.05
@@ -107,22 +102,3 @@ def test_what_is_caused_is_a_part_of_what_leaks_and_that_of_all_that_is_told(nam
         caused, leak, told = (a[f"{way} {what}"] for what in ("caused", "leak", "all"))
         assert (caused <= leak + 1e-12).all()
         assert (leak <= told + 1e-12).all()
-
-
-def spread(corner: tuple[int, int]) -> tuple[float, float, float]:
-    """Distances of a crop's pixels to the crease, nearest and farthest; and the share that is floor."""
-    setting = crease_in_space()
-    t = Tracer(setting.scene, Mosaic(setting.pinhole(SIDE, SIDE), (corner,)), 1, RECONNECTION)
-    v, _, _ = first_hit(t, np.full((t.D, t.sensor.n), 0.5), np.arange(t.sensor.n))
-    d = norm(v.x[:2])
-    return float(d.min()), float(d.max()), float((v.n[1] > 0.5).mean())
-
-
-def test_the_crop_of_space_holds_the_crease_and_the_one_before_it_did_not():
-    nearest, farthest, floor = spread(CROPS["crease"])
-    assert farthest < NEAR
-    assert farthest > 20 * nearest
-    assert 0.3 < floor < 0.7
-    nearest, farthest, floor = spread((943, 523))
-    assert farthest < 3 * nearest
-    assert floor == 0
