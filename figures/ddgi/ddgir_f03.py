@@ -172,7 +172,8 @@ NO_LEAK = "That is no leak to hide, so that the ratio is told and not judged."
 
 NARROW = (
     "So narrow, the gap has next to no probes in it, and x_2 is in it as well as x_1, on the furniture's underside: "
-    "asked there, probes outside leak as they do at x_1."
+    "asked there, probes outside leak as they do at x_1. Neither another displacement nor attenuation is to blame, by "
+    "the controls."
 )
 
 THEIR_FAILURE = (
@@ -225,9 +226,15 @@ def slope(h: Array, found: Array) -> float:
     return float(np.log(means[-1] / means[0]) / np.log(h[-1] / h[0]))
 
 
+HIDDEN = "What the paper says: behind a diffuse interaction these limits are hidden to a degree."
+STEEPER = "FS4, by what factor it falls, primary over secondary"
+OURS = "That bias falls faster at x_1 is our reading of it; the paper speaks of no rates."
+
+
 def sharper(a: Arrays) -> list[Claim]:
     """FS4: bias falls from the largest spacing to the smallest, and by more at x_1."""
     p, s = (by_spacing(a, method) for method in ("primary", "secondary"))
+    hidden = [criteria.ratio_below(y, x, 1) for x, y in zip(p, s, strict=True)]
     told = f"Slopes {slope(a['spacings'], p):.2f} at x_1 and {slope(a['spacings'], s):.2f} at x_2, end to end."
     fall = (p[-1] * s[0], p[0] * s[-1])  # grids of different spacings are independent: means of products factor
     steeper, flatter = criteria.ratio_below(*fall, 1), criteria.ratio_above(*fall, 1)
@@ -236,7 +243,8 @@ def sharper(a: Arrays) -> list[Claim]:
             Claim("DDGIR-C10", criteria.ratio_below(e[-1], e[0], 1), f"FS4, {name} falls", reason=told)
             for name, e in (("primary", p), ("secondary", s))
         ),
-        Claim("DDGIR-C10", steeper, "FS4, by what factor it falls, primary over secondary", flatter, reason=told),
+        Claim("DDGIR-C10", criteria.all_of(*hidden), "FS4, secondary over primary at every spacing", reason=HIDDEN),
+        Claim("DDGIR-C10", steeper, STEEPER, flatter, reason=f"{told} {OURS}"),
     ]
 
 
@@ -283,7 +291,6 @@ def draw(a: Arrays) -> "Picture":
         draw_errors(
             axes[1, 1], a["caustic spacings"], {method: of_matte(a, method) for method in LOOKS if method != "truth"}
         )
-        axes[1, 1].set(ylim=(0, 1))
     else:
         axes[1, 1].text(0.5, 0.5, "paper preset only", ha="center", va="center", transform=axes[1, 1].transAxes)
         axes[1, 1].set(xticks=[], yticks=[])
@@ -296,11 +303,11 @@ def draw_row(axis: "Axes", a: Arrays) -> None:
     inside = a[f"{key} inside"].mean(axis=0) > 0.5
     for method, look in LOOKS.items():
         axis.plot(a[f"{key} {method}"].mean(axis=0), **look)
-    high, pixel = axis.get_ylim()[1], np.arange(len(inside))
+    high, pixel = 1.1 * axis.get_ylim()[1], np.arange(len(inside))
     axis.fill_between(pixel, 0, high, where=inside, color=style.PALE, lw=0, zorder=0, label="below the furniture")
-    title = f"{worded(SHOWN)} of 1/{float(a['per unit']):g}"
+    title = f"FS4, a gap of {SHOWN:g} spacings of 1/{float(a['per unit']):g}"
     axis.set(xlabel="pixel", ylabel="indirect radiance", title=title, ylim=(0, high))
-    axis.legend(loc="lower left")
+    style.below(axis)
 
 
 def draw_gaps(axis: "Axes", a: Arrays) -> None:
@@ -325,7 +332,8 @@ def draw_errors(axis: "Axes", h: Array, found: Mapping[str, Array]) -> None:
     """|bias| over spacing."""
     for method, each in found.items():
         axis.plot(h, each.mean(axis=1), **{**LOOKS[method], "markevery": 1})
-    axis.set(xscale="log", yscale="log", xlabel="probe spacing (scene units)", ylabel="relative |bias|")
+    axis.set(xscale="log", xlabel="probe spacing (scene units)", ylabel="relative |bias|")
+    axis.set_ylim(bottom=0)
     axis.set_xticks(h, [f"1/{1 / each:g}" for each in h])
     axis.minorticks_off()
     axis.legend(loc="lower right")
@@ -339,8 +347,8 @@ FIGURE = Figure(
     claims=("DDGIR-F03", "DDGIR-C10"),
     presets={
         "quick": {
-            "per_unit": 8, "spacings": [4, 8, 16], "caustic spacings": [4, 8, 16], "pixels": 48, "rays": 32,
-            "grids": 8, "few grids": 8, "tolerance": 0.06, "glass tolerance": 0.06, "traced": 0,
+            "per_unit": 8, "spacings": [8, 16], "caustic spacings": [4, 8, 16], "pixels": 32, "rays": 32,
+            "grids": 8, "few grids": 8, "tolerance": 0.1, "glass tolerance": 0.06, "traced": 0,
         },
         "paper": {
             "per_unit": 8, "spacings": [8, 16, 32], "caustic spacings": [4, 8, 16], "pixels": 64, "rays": 128,

@@ -97,6 +97,11 @@ def elsewhere(a: Arrays, G_max: float) -> Claim:
     return Claim("DDGIR-F06", criteria.reported(text), part, reason=UNITLESS)
 
 
+WEIGHTS = (
+    "With weights that count inputs, of the paper's predecessor; those that compare targets leave less to bound, and "
+    "variance falls by less than half."
+)
+
 UNITLESS = "G_max = 1 is printed without a unit; in a room of 1 m it would be this."
 
 
@@ -116,7 +121,7 @@ def judged(a: Arrays, G_max: float) -> list[Claim]:
         return [Claim("DDGIR-F06", None, crease, reason=few), others]
     below = criteria.all_of(criteria.ratio_below(*high, 0.5), criteria.ratio_below(*spread, 0.5))
     above = criteria.all_of(criteria.ratio_above(*high, 1), criteria.ratio_above(*spread, 1))
-    return [Claim("DDGIR-F06", below, crease, above, reason=sweep(a, COUNTED)), others]
+    return [Claim("DDGIR-F06", below, crease, above, WEIGHTS, sweep(a, COUNTED)), others]
 
 
 def told(a: Arrays, weights: str, G_max: float) -> Claim:
