@@ -227,9 +227,9 @@ FIGURE = Figure(
     claims=("DDGIR-C02", "DDGIR-E11"),
     presets={
         "quick": {
-            "heights": [0.23, 0.27, 0.31, 0.35, 0.39], "rays": 2048, "frames": 8, "spacings": [4, 8, 16],
-            "volumes": [8, 1, 1],
-            "pixels": 32, "gathered": 64, "tolerances": [0.02, 0.06, 0.06], "points": 1000,
+            "heights": [0.23, 0.27, 0.31, 0.35, 0.39], "rays": 2048, "frames": 8, "spacings": [4, 8],
+            "volumes": [8, 1],
+            "pixels": 32, "gathered": 64, "tolerances": [0.01, 0.06], "points": 1000,
         },
         "paper": {
             "heights": [0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.4], "rays": 8192, "frames": 32, "spacings": [4, 8, 16],
