@@ -4,6 +4,7 @@ Lengths are in units of a room's height, as in `scenes`.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -39,6 +40,34 @@ def lamp_beside_probe() -> Setting:
     """FS12: a small light that is closer to probes (4 per unit) than to the table and the floor that it lights."""
     facets = [*room(0), *block((0.2, 0.001), (0.6, 0.2), 0), *chain([(0.41, 0.46), (0.39, 0.46)], 0, 40.0)]
     return Setting(scene(PLANE, [matte(0.5)], facets), (0.85, 0.6), (0.4, 0.2), crop=896)
+
+
+def couch(gap: float) -> Setting:
+    """FS4 with a gap of that height below its furniture, which ends at .3."""
+    slope = chain([(0.0, 0.0), (0.45, 0.45 * float(np.tan(np.radians(40))))], 0)
+    facets = [*room(0), *slope, *block((0.6, gap), (0.9, 0.3), 0), *chain(LAMP, 0, 8.0)]
+    return Setting(scene(PLANE, [matte(0.7)], facets), (0.55, 0.6), (0.45, 0.0), crop=512)
+
+
+def wedge_of_slab(degrees: float, thickness: float) -> Setting:
+    """FS4 with a wedge of that many degrees below a slab so thick, a hair from the wall; one facet if that is 0."""
+    slope, near, far = float(np.tan(np.radians(degrees))), 0.001, 0.45
+    up = thickness / float(np.cos(np.radians(degrees)))
+    below = [(far, far * slope), (near, near * slope)]
+    above = [(near, near * slope + up), (far, far * slope + up)]
+    slab = chain([below[1], *above, *below] if thickness else [(0.0, 0.0), below[0]], 0)
+    facets = [*room(0), *slab, *block((0.6, 0.03), (0.9, 0.3), 0), *chain(LAMP, 0, 8.0)]
+    return Setting(scene(PLANE, [matte(0.7)], facets), (0.55, 0.6), (0.45, 0.0), crop=512)
+
+
+def sunlit_slabs(thickness: float, lamp: float = 1.0) -> Setting:
+    """FS11 with outer walls so thick, outside the same room; as it is if that is 0."""
+    thin = sunlit(lamp)
+    if not thickness:
+        return thin
+    sun = chain([(-0.5, 1.2), (-0.5, -0.2)], 0, 40.0)
+    outside = block((-thickness, -thickness), (1 + thickness, 1 + thickness), 0)
+    return replace(thin, scene=scene(PLANE, [matte(0.75)], [*room(0), *outside, *chain(LAMP, 0, lamp), *sun]))
 
 
 def octagon(centre: Point, radius: float) -> list[Point]:

@@ -1,13 +1,14 @@
 """Where surfaces meet: chains of frames of DDGI resampling with bounded and unbounded geometry terms.  [DDGIR 3.5]
 
 One crop looks into the crease, another one away from it.  Neighbours, history and cap are those of
-the real-time preset.
+the real-time preset; as in the paper's predecessor nothing is reused between x_1 whose normals differ.  [Bitterli 2020]
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache as once
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -21,18 +22,18 @@ from flatland2d.sensors import FILM
 from restir_ref.batch import Array
 from restir_ref.chance import Chance, Live
 from restir_ref.images import random_in_disk
-from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.integrals import NOWHERE, Pixels, Reservoirs
 from restir_ref.loop import REAL_TIME, Around, Preset, random_in_row
 from restir_ref.transport.cache.converge import converge
 from restir_ref.transport.cache.frame import frame, image
-from restir_ref.transport.cache.integrals import cache_integrals, lit, looking, unseen
+from restir_ref.transport.cache.integrals import CacheIntegrals, cache_integrals, lit, looking, unseen
 from restir_ref.transport.cache.leaving import Cache, telling
 from restir_ref.transport.cache.shading import plain
 from restir_ref.transport.cache.update import Updating
 from restir_ref.transport.cache.volume import Volume, unlit
 from restir_ref.transport.paths import RECONNECTION, Sensor, Tracer, first_hit
 from restir_ref.transport.scene import Scene
-from restir_ref.transport.vectors import norm
+from restir_ref.transport.vectors import dot, norm
 from tracer3d.directions import MAPS as OCTAHEDRA
 from tracer3d.probe_rooms import probes as probes_in_space
 from tracer3d.scenes import crease as crease_in_space
@@ -53,9 +54,15 @@ FLOOR = 896
 NEAR = 0.02
 """A room's height is 1: pixels of the crease see what is closer than that to another surface."""
 
+ALIKE = float(np.cos(np.radians(25)))
+"""The least cosine between the normals of x_1 that reuse one another's samples."""
+
 SIDE = 10
-CROPS = {"crease": (943, 523), "away": (1300, 800)}
-"""Crops of space, SIDE pixels wide: the middle of the view, on the crease; and floor."""
+CROPS = {"crease": (955, 535), "away": (1300, 800)}
+"""Crops of space, SIDE pixels wide: around the middle of the view, through which the crease goes; and floor.
+
+Fireflies need x_1 at unequal distances from the crease, down to none: half of the crop is floor, half wall.
+"""
 
 
 def bare(X: Reservoirs, here: Pixels) -> Reservoirs:
@@ -122,18 +129,38 @@ def _cache(scene: Scene, empty: Volume) -> Cache:
     return Cache(scene, v, along_view(v))
 
 
+def alike(of: CacheIntegrals, index: Array, near: Pixels) -> Pixels:
+    """Those of the columns `near` (N,) whose normals are as those of columns `index` are; NOWHERE for others.
+
+    A choice by x_1, never by samples.  [Bitterli 2020]
+    """
+    theirs: CacheIntegrals = near.of  # type: ignore[assignment]
+    same = dot(of.v.n.take(index, axis=-1), theirs.v.n.take(near.index, axis=-1)) > ALIKE
+    return Pixels(near.of, np.where(same, near.index, NOWHERE))
+
+
+def on_one_surface(around: Around) -> Around:
+    """The same neighbours, none where normals differ."""
+
+    def chosen(of: Any, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
+        return [alike(of, index, near) for near in around(of, index, count, radius, chance)]
+
+    return chosen
+
+
 def chain(of: Crease, G_max: float, weights: str, replicas: int, frames: int, chance: Chance) -> Iterator[Array]:
     """Grey images (replicas, n) of frames after WARMING, each with new x_1; 1/M looks in the end only."""
     t, n = Tracer(of.cache.scene, of.sensor, 1, RECONNECTION), of.sensor.n
     index = np.arange(replicas * n)
     history: Reservoirs | None = None
-    before: list[Pixels] = []
+    last: list[Pixels] = []
     sight, remembered = (looking, bare) if weights == BALANCED else (unseen, lit)
     for k in range(WARMING + frames):
         first = cache_integrals(t, of.cache, chance.uniform((t.D, len(index))), index % n, G_max)
         here = Pixels(replace(first, shape=(n,), sight=sight), index)
-        now = frame(here, chance, PRESETS[weights], of.around, history, before)
-        history, before = remembered(now.X, here), [here]
+        before = [alike(first, index, each) for each in last]
+        now = frame(here, chance, PRESETS[weights], on_one_surface(of.around), history, before)
+        history, last = remembered(now.X, here), [here]
         if k >= WARMING:
             yield image(replace(now, X=history), here, plain, chance).mean(axis=0).reshape(replicas, n)
 
