@@ -47,6 +47,7 @@ from restir_ref.transport.cache.shading import own_light
 from restir_ref.transport.cache.update import Updating
 from restir_ref.transport.cache.volume import unlit
 from restir_ref.transport.materials import albedo
+from restir_ref.transport.rays import arrive
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.vectors import dot
 
@@ -171,16 +172,24 @@ def radiosities(of: Scenery) -> Array:
 
 
 def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
-    """Per room: images (method, replica, n), tails (group, 2, n), sliders, and truth (2, n)."""
+    """Per room: images (method, replica, n), tails (group, 2, n), sliders, truth (2, n), and material seen (n,)."""
     listed, found = list(zip(chunks(preset), results, strict=True)), {}
     for room in preset["rooms"]:
         mine = [r for c, r in listed if c["room"] == room]
         found[f"{room}.images"] = np.concatenate([r["images"] for r in mine if "images" in r], axis=1)
         found[f"{room}.tails"] = np.stack([r["tails"] for r in mine if "tails" in r])
         found[f"{room}.slider"] = np.array([r["slider"] for r in mine if "slider" in r])
+        found[f"{room}.seen"] = seen(room, preset["pixels"])
         truths = [r["truth"] for r in mine if "truth" in r]
         found[f"{room}.truth"] = np.mean(truths, axis=0) if truths else known(room, preset["pixels"])
     return found
+
+
+def seen(room: str, n: int) -> Array:
+    """The material that each pixel sees, (n,)."""
+    setting = ROOMS[PLACES[room].room]()
+    x, w, _ = replace(setting.pinhole(n, 0), film=n).ray(np.arange(n), np.full((1, n), 0.5))
+    return arrive(setting.scene, x, w)[0].material
 
 
 def errors(a: Arrays, room: str) -> Array:
@@ -194,6 +203,9 @@ def biases(a: Arrays, room: str) -> Array:
 
 
 PARTS = ("whole film: resampled / path tracing", "whole film: resampled / secondary")
+ORDER = ((PRIMARY, OURS), (OURS, SECONDARY), (SECONDARY, TREES))
+VARIANCES = tuple(f"whole film: variance, {METHODS[x]} < {METHODS[y]}" for x, y in ORDER)
+NEAR = "whole film of FS2: resampled / path tracing and / secondary, by what pixels see"
 BIASED = f"whole film, {SPARSE:g} probes per unit: bias, secondary / primary"
 
 
@@ -201,11 +213,9 @@ def check(a: Arrays) -> list[Claim]:
     """Ratios of errors of one frame; and of bias, in the rooms in which primary queries have some."""
     rooms = [name for name in ROOMS_SEEN if f"{name}.images" in a]
     if len(rooms) < len(ROOMS_SEEN) or a["FS3.images"].shape[1] < ENOUGH:
-        ids = ("DDGIR-F08", "DDGIR-F08", "DDGIR-F08b")
-        return [
-            Claim(each, None, part, reason="One room, or few images, cannot tell.")
-            for each, part in zip(ids, (*PARTS, BIASED), strict=True)
-        ]
+        few = "One room, or few images, cannot tell."
+        ids = {"DDGIR-F08": (*PARTS, NEAR), "DDGIR-F08b": (*VARIANCES, BIASED)}
+        return [Claim(id_, None, part, reason=few) for id_, parts in ids.items() for part in parts]
     e = {name: errors(a, name) for name in rooms}
     trees = {name: criteria.ratio_below(x[OURS], x[TREES], 0.7) for name, x in e.items()}
     second = {name: criteria.ratio_below(x[OURS], x[SECONDARY], 0.9) for name, x in e.items()}
@@ -213,8 +223,39 @@ def check(a: Arrays) -> list[Claim]:
     return [
         Claim("DDGIR-F08", in_rooms(trees, len(rooms)), PARTS[0]),
         Claim("DDGIR-F08", in_rooms(second, 4), PARTS[1], in_rooms(worse, 2)),
+        Claim("DDGIR-F08", criteria.reported(by_surface(a)), NEAR),
+        *check_variances(a, rooms),
         check_bias({name: biases(a, name).mean(axis=-1) for name in rooms}, a),
     ]
+
+
+def by_surface(a: Arrays) -> str:
+    """Ratios of errors in FS2, of pixels that see the rough room and of those that see the boxes."""
+    said = []
+    for what, name in enumerate(("room", "boxes")):
+        k = np.flatnonzero(a["FS2.seen"] == what)
+        e = mape_with_floor(a["FS2.images"][..., k], a["FS2.truth"][0, k]).mean(axis=-1)
+        said.append(f"{name} ({len(k)} pixels) {e[OURS] / e[TREES]:.2f} and {e[OURS] / e[SECONDARY]:.2f}")
+    return "; ".join(said)
+
+
+def check_variances(a: Arrays, rooms: Sequence[str]) -> list[Claim]:
+    """The order of noise, in all rooms."""
+    V = {name: variances(a, name) for name in rooms}
+    found = []
+    for (x, y), part in zip(ORDER, VARIANCES, strict=True):
+        below, above = (
+            {name: rule(v[x], v[y], 1) for name, v in V.items()}
+            for rule in (criteria.ratio_below, criteria.ratio_above)
+        )
+        found.append(Claim("DDGIR-F08b", in_rooms(below, len(rooms)), part, in_rooms(above, 3)))
+    return found
+
+
+def variances(a: Arrays, room: str) -> Array:
+    """Squares of what is not the mean over replicas, averaged over pixels: (method, replica)."""
+    images = a[f"{room}.images"]
+    return np.asarray(((images - images.mean(axis=1, keepdims=True)) ** 2).mean(axis=-1))
 
 
 def check_bias(B: dict[str, Array], a: Arrays) -> Claim:
