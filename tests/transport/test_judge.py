@@ -234,6 +234,35 @@ def test_the_report_says_which_jacobians_were_tested():
     assert 5 < high <= most
 
 
+# Light that is replayed from a cache.
+
+
+def replayed(t: Tracer, x: Path, pixel: Array) -> tuple[Path, Array]:
+    """The offset path carries the light that was stored with the base path; all else is right."""
+    y, J = shift_path(t, x, pixel)
+    return replace(y, F=np.where(J > 0, x.F, 0)), J
+
+
+@pytest.mark.claims("GRIS-A11")
+@pytest.mark.parametrize("setting", ["glossy_cornell", "crease"])
+def test_light_replayed_from_a_cache_is_convicted_by_tracing_and_not_by_its_jacobian(setting):
+    """There and back it returns, F and all; J is that of the shift."""
+    found = judged(Shifting(tracer(setting, HYBRID), replayed), THOROUGH)
+    assert {TRACED, AGAIN} <= set(found.red)
+    assert {RETURN, DEFINED, INVERSE, SLOPE} & set(found.red) == set()
+    worst = found.findings[TRACED].offender
+    assert worst.what == "p_hat"
+    text = report(found)
+    assert text.startswith(f"WRONG: {TRACED}, {AGAIN}")
+    assert f"p_hat: found {worst.found:.9g}, expected {worst.expected:.9g}" in text
+
+
+def test_light_traced_anew_is_acquitted():
+    """Twin: the same shift, which keeps the F of the offset path."""
+    found = judged(Shifting(tracer("glossy_cornell", HYBRID), shift_path), THOROUGH)
+    assert found.green, report(found)
+
+
 # Refusals, and a stranger's function.
 
 
