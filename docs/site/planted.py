@@ -37,6 +37,7 @@ from restir_ref.restir import initial, shade, spatial, temporal
 from restir_ref.transport.paths import Connectability, Tracer
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.proofs.zoo.bug import TransportBug
+from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
 from restir_ref.transport.restir_pt import PathIntegrals, ScatteredIntegrals
 from restir_ref.transport.scene import Scene, scene
 
@@ -347,15 +348,29 @@ def significant(difference: Array) -> Array:
 def exact(bug: Bug) -> Figure:
     """The exact bias of every cell of the mistake's own scene, pixel by pixel."""
     scene = bug.scene()
-    bias = 100 * exact_bias(bug.wrong(scene), scene)
+    return bars(exact_bias(bug.wrong(scene), scene))
+
+
+def bars(of: Array, place: str = "pixel", cell: str = "cell") -> Figure:
+    """A bias (places, cells)."""
+    bias = 100 * of
     picture = Figure(figsize=(6.6, 2.2), layout="constrained")
     axes = np.atleast_1d(picture.subplots(1, len(bias), sharey=True))
     for k, (ax, of_pixel) in enumerate(zip(axes, bias, strict=True)):
         ax.bar(np.arange(len(of_pixel)), of_pixel, color=[style.COLOURS[3 * (b > 0)] for b in of_pixel])
         ax.axhline(0, color="k", lw=0.8)
-        ax.set(xlabel="cell", title=f"pixel {k}")
+        ax.set(xlabel=cell, title=f"{place} {k}" if len(bias) > 1 else "", xticks=np.arange(len(of_pixel)))
     axes[0].set_ylabel("bias (%)")
     return picture
+
+
+AXES = {
+    "constant of the glossy term as printed": ("", "a mirror in flatland (0) and in space (1)"),
+    "probes without direct light at the second vertex": ("", "place"),
+    "no residual beside bounded geometry": ("", "point of the wall, from the crease upwards"),
+    "shading with the kept value": ("channel", "pixel"),
+}
+"""What places and cells are, where they are no pixels and cells."""
 
 
 def exact_noise(bug: Bug) -> Figure:
@@ -375,6 +390,8 @@ def picture_of(name: str) -> tuple[Figure, str]:
     """A mistake's picture, and its kind: "planted" or "exact"."""
     if name in OTHERS:
         return OTHERS[name](), "planted"
+    if name in CACHE_BUGS:
+        return bars(CACHE_BUGS[name].wrong(), *AXES.get(name, ("pixel", "cell"))), "exact"
     if name in TRANSPORT_BUGS:
         return beside(*both_of(TRANSPORT_BUGS[name])), "planted"
     bug = {**BUGS, **INEFFICIENT}[name]
@@ -391,7 +408,7 @@ def main() -> None:
     parser.add_argument("words", nargs="*", help="parts of names; none for all")
     words = parser.parse_args().words
     FOLDER.mkdir(exist_ok=True)
-    for name in (*OTHERS, *BUGS, *INEFFICIENT, *TRANSPORT_BUGS):
+    for name in (*OTHERS, *BUGS, *INEFFICIENT, *TRANSPORT_BUGS, *CACHE_BUGS):
         if words and not any(word in name for word in words):
             continue
         with style.context():

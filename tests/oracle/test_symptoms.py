@@ -1,6 +1,7 @@
 """The index of symptoms agrees with the zoo: its words with the signs of exact biases, its page with the numbers."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -8,8 +9,9 @@ import pytest
 from restir_ref.oracle.zoo.cures import CURES
 from restir_ref.oracle.zoo.page import BEFORE, SECTIONS, Entry, pieces
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
+from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
 from restir_ref.transport.proofs.zoo.cures import PATH_CURES
-from restir_ref.transport.proofs.zoo.page import section
+from restir_ref.transport.proofs.zoo.page import cached, section
 from tests.checkout import ROOT
 from tests.oracle.pinned import ALL, looked_up
 
@@ -38,10 +40,16 @@ def test_poor_words_are_noticed(part, words) -> None:
     assert poor_words(replace(said, bug=replace(said.bug, **{part: words})))
 
 
+def others() -> Iterator[str]:
+    """The parts of the page about paths and caches."""
+    yield from section([*TRANSPORT_BUGS.values()])
+    yield from cached([*CACHE_BUGS.values()])
+
+
 def test_the_index_of_symptoms_is_up_to_date() -> None:
     """If not: python -m restir_ref.transport.proofs.zoo > docs/symptoms.md."""
     text = (ROOT / "docs" / "symptoms.md").read_text(encoding="utf-8")
-    assert text == "".join([*pieces([looked_up(name) for name in ALL]), *section([*TRANSPORT_BUGS.values()])])
+    assert text == "".join([*pieces([looked_up(name) for name in ALL]), *others()])
     assert [text.count(f"## {title}\n") for title in SECTIONS] == [1] * len(SECTIONS)
 
 
@@ -62,7 +70,7 @@ def cures_missing(text: str) -> list[str]:
 def test_every_symptom_of_the_page_has_a_cure() -> None:
     text = (ROOT / "docs" / "symptoms.md").read_text(encoding="utf-8")
     assert cures_missing(text) == []
-    assert text.count("| cure |") == len(SECTIONS) + 2
+    assert text.count("| cure |") == len(SECTIONS) + 3
 
 
 @pytest.mark.parametrize(

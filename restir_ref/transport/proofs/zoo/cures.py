@@ -25,3 +25,16 @@ PATH_CURES: Mapping[str, str] = MappingProxyType(
     }
 )
 """By the names of bugs."""
+
+CACHE_CURES: Mapping[str, str] = MappingProxyType(
+    {
+        "constant of the glossy term as printed": "one normalisation of E for both terms; try a furnace",
+        "probes without direct light at the second vertex": "let probes take L_e of what they see: Eq. 5",
+        "no residual beside bounded geometry": "add max(1 - G_max / G, 0) of one ray drawn by the BSDF",
+        "shading with the kept value": "select with the kept value, and ask the cache anew for the one that is shaded",
+        "target drawn anew where W is formed": "keep the number that was selected with, and divide by that",
+        "MIS weights that see the kept value": "p_hat = a factor of the pixel times a factor that travels",
+        "kept value of 0 where others see light": "a target that is positive wherever another pixel may see light",
+    }
+)
+"""By the names of bugs about caches."""
