@@ -10,12 +10,13 @@ import numpy as np
 from restir_ref.audit.estimator import TOLERANCE, facts_of
 from restir_ref.audit.known import FILE, digest, pattern
 from restir_ref.audit.likeness import FEW_LEAVES, loops, signatures, table_of
+from restir_ref.audit.rehearsal import CannotAudit
 from restir_ref.oracle.scenes import Scene, random_scene, reference_scene, three_pixel_scene, two_technique_scene
 from restir_ref.oracle.zoo import BUGS, Bug
 
 SCENES = (reference_scene, three_pixel_scene, two_technique_scene)
 
-SEEDS = (101, 102)
+SEEDS = (101,)
 """Of random scenes like a bug's own, on which it may need less, or more."""
 
 
@@ -23,7 +24,10 @@ def patterns(bug: Bug, scene: Scene) -> Iterator[tuple[str, str]]:
     """What the bug needs in every loop that runs on this scene, is right without it, and shows it: loop and pattern."""
     for loop, right, wrong in loops(bug):
         if abs(table_of(right, scene)).max() <= TOLERANCE < abs(table_of(wrong, scene)).max():
-            yield loop, pattern(facts_of(wrong(scene), scene, FEW_LEAVES))
+            try:
+                yield loop, pattern(facts_of(wrong(scene), scene, FEW_LEAVES))
+            except CannotAudit:  # a mistake that is none of an estimator: it mixes columns
+                continue
 
 
 def scenes_of(bug: Bug) -> Iterator[Scene]:

@@ -217,6 +217,12 @@ def test_jacobians_clamped_both_ways_are_convicted_though_hardly_any_path_shows_
     found = judge(Shifting(t, clamped), Live(np.random.default_rng(seed)), checks={SLOPE: CHECKS[SLOPE]})
     assert found.red == (SLOPE,)
     assert found.findings[SLOPE].where.startswith("J tested from 0.1 to ")
+    assert re.search(r", 0\.1 in \d+ of them: a limit\?", found.findings[SLOPE].where)
+
+
+def test_a_right_jacobian_is_not_taken_for_a_limit():
+    found = judge(PathIntegrals(tracer("glossy_cornell", HYBRID)), Live(np.random.default_rng(1)), BRIEF)
+    assert "a limit?" not in report(found)
 
 
 def test_paths_taken_evenly_from_all_kinds_do_not_show_it(monkeypatch):

@@ -12,6 +12,7 @@ from restir_ref.batch import Array, take
 from restir_ref.transport.proofs.inversion import traced
 from restir_ref.transport.proofs.shift_checks import (
     DERIVATIVES,
+    POSITIONS,
     Case,
     Finding,
     Trial,
@@ -49,7 +50,16 @@ def _unsteady(case: Case, decided: int, measured: int) -> str:
 
 
 def _range(J: Array) -> str:
-    return f"{len(J)} paths have it from {J.min():.3g} to {J.max():.3g}: limits beyond show in other scenes only"
+    repeated = [
+        f", {end:.3g} in {times} of them: a limit?" for end in (J.min(), J.max()) if (times := _times(J, end)) > 1
+    ]
+    said = f"{len(J)} paths have it from {J.min():.3g} to {J.max():.3g}"
+    return f"{said}{''.join(repeated)}; limits beyond show in other scenes only"
+
+
+def _times(J: Array, end: float) -> int:
+    """How often an end of J comes, if it is not 1, which many shifts have everywhere."""
+    return int(np.count_nonzero(end == J)) if abs(end - 1) > POSITIONS else 0
 
 
 def spread(of: Trial, most: int) -> Array:
