@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from restir_ref.audit.estimator import TOLERANCE, facts_of
+from restir_ref.audit.estimator import FEW_TO_RERUN, TOLERANCE, facts_of
 from restir_ref.audit.known import FILE, digest, pattern
-from restir_ref.audit.likeness import FEW_LEAVES, loops, signatures, table_of
-from restir_ref.audit.rehearsal import CannotAudit
+from restir_ref.audit.likeness import loops, signatures, table_of
 from restir_ref.oracle.scenes import Scene, random_scene, reference_scene, three_pixel_scene, two_technique_scene
 from restir_ref.oracle.zoo import BUGS, Bug
 
@@ -25,8 +24,8 @@ def patterns(bug: Bug, scene: Scene) -> Iterator[tuple[str, str]]:
     for loop, right, wrong in loops(bug):
         if abs(table_of(right, scene)).max() <= TOLERANCE < abs(table_of(wrong, scene)).max():
             try:
-                yield loop, pattern(facts_of(wrong(scene), scene, FEW_LEAVES))
-            except CannotAudit:  # a mistake that is none of an estimator: it mixes columns
+                yield loop, pattern(facts_of(wrong(scene), scene, FEW_TO_RERUN))
+            except ValueError:  # as many outcomes as audits do not run again, or a mistake that mixes columns
                 continue
 
 
