@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from restir_ref.audit import BadDump, audit_dump, audit_estimator, audit_images
-from restir_ref.audit.estimator import FEW_TO_RERUN, TOLERANCE, facts_of
+from restir_ref.audit.estimator import TOLERANCE, facts_of
 from restir_ref.audit.known import needing_the_same
 from restir_ref.audit.likeness import FEW_LEAVES, OTHER_LOOPS, loops, table_of
 from restir_ref.integrals import Pixels
@@ -146,7 +146,7 @@ def matrix(seed: int) -> str:
             if abs(table_of(right, scene)).max() > TOLERANCE or abs(table_of(wrong, scene)).max() <= TOLERANCE:
                 continue
             try:
-                kin = needing_the_same(facts_of(wrong(scene), scene, FEW_TO_RERUN))
+                kin = needing_the_same(facts_of(wrong(scene), scene, FEW_LEAVES))
             except ValueError:  # too many outcomes to be run again, or columns that are mixed
                 found["not run again"] += 1
                 continue

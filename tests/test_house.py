@@ -221,7 +221,7 @@ def test_a_list_of_figures_is_noticed(tmp_path, path, name):
 
 # ---------------------------------------------------------------- chance
 
-DOORS = ("restir_ref.chance", "restir_ref.audit.make_known", "restir_ref.transport.proofs.golden.make", "tracer3d.cli")
+DOORS = ("restir_ref.chance", "restir_ref.transport.proofs.golden.make", "tracer3d.cli")
 DICE = re.compile(r"(?:(?:np|numpy)\.)?random\.(?!Generator$)\w+|(?:numpy\.)?random$")
 
 
