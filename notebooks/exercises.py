@@ -209,6 +209,8 @@ def careful_shift(mine: PathShift, most: float = 2.0) -> str:
     found = judge(Shifting(t, mine), Live(np.random.default_rng(SEED)), Effort(paths=4000, jacobians=40))
     if found.red:
         return not_yet(f"J is never above {most:g}, but this is no shift; laws that fail: {', '.join(found.red)}.")
+    if found.undecided:
+        return not_yet(f"J is never above {most:g}, but too few paths are left for: {', '.join(found.undecided)}.")
     refused = (J == 0).mean() - (shift_path(t, x, pixel + FAR)[1] == 0).mean()
     return right(
         f"{len(found.findings)} laws hold. Of the paths shifted by {FAR} pixels, {refused:.0%} are now refused."

@@ -66,11 +66,12 @@ def test_the_path_shifts_are_acquitted_and_a_refusal_one_way_is_not(skeletons):
         y, J = skeletons.shift_path(t, x, pixel)
         return y, np.where(J <= 2, J, 0.0)
 
-    def red(of):
-        return judge(of, Live(np.random.default_rng(1)), Effort(paths=5000, jacobians=60)).red
+    def judged(of):
+        return judge(of, Live(np.random.default_rng(1)), Effort(paths=5000, jacobians=60))
 
-    assert red(skeletons.TURNED) == red(skeletons.CAREFUL) == ()
-    assert "defined back" in red(skeletons.Shifting(skeletons.tracer, careless))
+    assert judged(skeletons.TURNED).green
+    assert judged(skeletons.CAREFUL).green
+    assert "defined back" in judged(skeletons.Shifting(skeletons.tracer, careless)).red
 
 
 def test_the_bug_is_biased_where_the_right_loop_is_not(skeletons):

@@ -7,7 +7,7 @@ made of cells (a table of densities, a sampler's index), its picture is that of 
 
 import argparse
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -29,13 +29,15 @@ from restir_ref.chance import Chance, Live
 from restir_ref.images import random_in_disk
 from restir_ref.integrals import Image, Pixels, Reservoirs, Shifted
 from restir_ref.oracle.cells import Frame
-from restir_ref.oracle.scenes import Loop, Parts, next_pixel
+from restir_ref.oracle.scenes import Loop, Parts, next_pixel, one_frame
 from restir_ref.oracle.zoo import BUGS, INEFFICIENT, Bug, exact_bias
+from restir_ref.oracle.zoo.candidates import changed
 from restir_ref.oracle.zoo.checks import statistics
 from restir_ref.restir import initial, shade, spatial, temporal
 from restir_ref.transport.paths import Connectability, Tracer
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.proofs.zoo.bug import TransportBug
+from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
 from restir_ref.transport.restir_pt import PathIntegrals, ScatteredIntegrals
 from restir_ref.transport.scene import Scene, scene
 
@@ -196,6 +198,90 @@ def both_of(bug: TransportBug) -> tuple[Array, Array]:
     return rendered(reusing(right), right), rendered(reusing(wrong), wrong)
 
 
+# ---------------------------------------------------------------- what is not in the zoo
+
+RARE = 0.01
+"""The share of null samples whose 0/0 is not caught."""
+
+FRAMES, LATER, SHORT, LONG = 10, 3, 2, 60
+"""Frames of a history, of how many later it is looked at again, and its caps."""
+
+HALF = 2.0**14
+"""The unit in which W is stored as a half float."""
+
+
+def poisoned() -> Figure:
+    """Images after passes of reuse: what has read a NaN is one."""
+    of, chance = seen(), Live(np.random.default_rng(1))
+    here = Pixels(of, np.arange(SIDE * SIDE))
+    X = initial(here, chance)
+    bad = (X.W == 0) & (chance.uniform(X.W.shape) < RARE)
+    picture = Figure(figsize=(6.6, 2.5), layout="constrained")
+    for k, ax in enumerate(picture.subplots(1, 3)):
+        light = shade(X, here).mean(axis=0)
+        image = np.where(bad, np.nan, light).reshape(SIDE, SIDE)
+        shown(ax, image, f"after {2 * k} passes", cmap=style.IMAGE_MAP, vmin=0, vmax=4 * light.mean())
+        for _ in range(2):
+            (near,) = in_disk(of, here.index, X, chance)
+            X, bad = spatial(X, here, [near], chance), bad | bad[near.index]
+    return picture
+
+
+def halved(W: Array, x: Array, coin: Array) -> Array:
+    """W as a half float in units of 1 / HALF; what overflows is dropped."""
+    with np.errstate(over="ignore"):
+        stored = (W * HALF).astype(np.float16).astype(float) / HALF
+    return np.where(np.isfinite(stored), stored, 0.0)
+
+
+def overflown() -> Figure:
+    """New samples whose W is stored as a half float."""
+    at = film()
+    right, wrong = (rendered(loop_of(Parts(one_frame, draw=draw)), at.now) for draw in (initial, changed(halved)))
+    return beside(right, wrong)
+
+
+def later(cap: float) -> tuple[Array, Array]:
+    """Frame FRAMES of REPLICAS films with new samples, history up to a cap and a neighbour, and LATER frames on."""
+    of, chance = seen(), Live(np.random.default_rng(1))
+    here = Pixels(of, np.arange(SIDE * SIDE * REPLICAS))
+    X, found = initial(here, chance), []
+    for _ in range(FRAMES + LATER):
+        X = temporal(initial(here, chance), here, X, [here], chance, cap=cap)
+        X = spatial(X, here, in_disk(of, here.index, X, chance), chance)
+        found.append(shade(X, here).mean(axis=0).reshape(-1, SIDE, SIDE))
+    return found[FRAMES - 1], found[-1]
+
+
+def correlation(before: Array, now: Array) -> Array:
+    """Between two frames, over films (films, rows, columns) and 9 pixels; 0 where nothing varies."""
+    x, y = (each - each.mean(axis=0) for each in (before, now))
+    both, alone = smooth((x * y).mean(axis=0)), smooth((x**2).mean(axis=0)) * smooth((y**2).mean(axis=0))
+    return np.asarray(both / np.sqrt(np.maximum(alone, 1e-30)))
+
+
+def boiling() -> Figure:
+    """A frame with a long history, a later one, and how they correlate; with a short history for comparison."""
+    (before, now), brief = later(LONG), correlation(*later(SHORT))
+    picture = Figure(figsize=(6.6, 2.5), layout="constrained")
+    axes, bright = list(picture.subplots(1, 3)), 2 * np.percentile(before.mean(axis=0), 98)
+    shown(axes[0], before[0], f"M up to {LONG}, a frame", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
+    shown(axes[1], now[0], f"{LATER} frames later", vmin=0, vmax=bright, cmap=style.IMAGE_MAP)
+    shared = correlation(before, now)
+    title = f"correlated: {shared.mean():.2f}\n(M up to {SHORT}: {brief.mean():.2f})"
+    drawn = shown(axes[2], shared, title, vmin=0, vmax=1, cmap="magma")
+    picture.colorbar(drawn, ax=axes[2], shrink=0.85)
+    return picture
+
+
+OTHERS: Mapping[str, Callable[[], Figure]] = {
+    "NaN spread by reuse": poisoned,
+    "W beyond half floats": overflown,
+    "history too long": boiling,
+}
+"""Mistakes of the page that are not in the zoo, planted all the same."""
+
+
 # ---------------------------------------------------------------- pictures
 
 
@@ -262,15 +348,29 @@ def significant(difference: Array) -> Array:
 def exact(bug: Bug) -> Figure:
     """The exact bias of every cell of the mistake's own scene, pixel by pixel."""
     scene = bug.scene()
-    bias = 100 * exact_bias(bug.wrong(scene), scene)
+    return bars(exact_bias(bug.wrong(scene), scene))
+
+
+def bars(of: Array, place: str = "pixel", cell: str = "cell") -> Figure:
+    """A bias (places, cells)."""
+    bias = 100 * of
     picture = Figure(figsize=(6.6, 2.2), layout="constrained")
     axes = np.atleast_1d(picture.subplots(1, len(bias), sharey=True))
     for k, (ax, of_pixel) in enumerate(zip(axes, bias, strict=True)):
         ax.bar(np.arange(len(of_pixel)), of_pixel, color=[style.COLOURS[3 * (b > 0)] for b in of_pixel])
         ax.axhline(0, color="k", lw=0.8)
-        ax.set(xlabel="cell", title=f"pixel {k}")
+        ax.set(xlabel=cell, title=f"{place} {k}" if len(bias) > 1 else "", xticks=np.arange(len(of_pixel)))
     axes[0].set_ylabel("bias (%)")
     return picture
+
+
+AXES = {
+    "constant of the glossy term as printed": ("", "a mirror in flatland (0) and in space (1)"),
+    "probes without direct light at the second vertex": ("", "place"),
+    "no residual beside bounded geometry": ("", "point of the wall, from the crease upwards"),
+    "shading with the kept value": ("channel", "pixel"),
+}
+"""What places and cells are, where they are no pixels and cells."""
 
 
 def exact_noise(bug: Bug) -> Figure:
@@ -288,6 +388,10 @@ def exact_noise(bug: Bug) -> Figure:
 
 def picture_of(name: str) -> tuple[Figure, str]:
     """A mistake's picture, and its kind: "planted" or "exact"."""
+    if name in OTHERS:
+        return OTHERS[name](), "planted"
+    if name in CACHE_BUGS:
+        return bars(CACHE_BUGS[name].wrong(), *AXES.get(name, ("pixel", "cell"))), "exact"
     if name in TRANSPORT_BUGS:
         return beside(*both_of(TRANSPORT_BUGS[name])), "planted"
     bug = {**BUGS, **INEFFICIENT}[name]
@@ -304,7 +408,7 @@ def main() -> None:
     parser.add_argument("words", nargs="*", help="parts of names; none for all")
     words = parser.parse_args().words
     FOLDER.mkdir(exist_ok=True)
-    for name in (*BUGS, *INEFFICIENT, *TRANSPORT_BUGS):
+    for name in (*OTHERS, *BUGS, *INEFFICIENT, *TRANSPORT_BUGS, *CACHE_BUGS):
         if words and not any(word in name for word in words):
             continue
         with style.context():

@@ -1,4 +1,4 @@
-"""`python -m restir_ref.audit DUMP`, and beside dumps: `images`, `ladder`, `schema`.
+"""`python -m restir_ref.audit DUMP`, and beside dumps: `images`, `ladder`, `shift`, `schema`.
 
 Exit status 0: right, 1: wrong, 2: cannot be read, 3: undecided.
 """
@@ -12,13 +12,15 @@ from pathlib import Path
 from types import MappingProxyType
 
 from restir_ref.audit.chain import chained
-from restir_ref.audit.commands import Command, images_command, ladder_command
+from restir_ref.audit.commands import Command, images_command, ladder_command, shift_command
 from restir_ref.audit.dump import RTOL, audit_dump
 from restir_ref.audit.fields import BadDump
 from restir_ref.audit.pages import page
 from restir_ref.audit.schema import schema
 
-COMMANDS: Mapping[str, Command] = MappingProxyType({"images": images_command, "ladder": ladder_command})
+COMMANDS: Mapping[str, Command] = MappingProxyType(
+    {"images": images_command, "ladder": ladder_command, "shift": shift_command}
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,7 +38,7 @@ def _dumps(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m restir_ref.audit",
         description="Recompute a dumped resampling pass and name the first wrong term. Of several dumps, each is the "
-        "input of the next. Other commands: images, ladder, schema (the format, for programs).",
+        "input of the next. Other commands: images, ladder, shift, schema (the format, for programs).",
         epilog="exit status: 0 if every dumped term is right, 1 if one is wrong, 2 if the dump cannot be read. "
         f"The format, for people: {page('audit.md')}; other pages named docs/... lie beside it.",
     )

@@ -1,13 +1,15 @@
-"""The commands for those who have images only."""
+"""The commands for those who have images only, or a table of a shift."""
 
 import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from restir_ref.audit.fields import BadDump
 from restir_ref.audit.image_files import DECODERS, images
 from restir_ref.audit.image_picture import draw
 from restir_ref.audit.images import EPS, BadImages, ImageReport, audit_images, audit_ladder
+from restir_ref.audit.shift_table import audit_shift_table, shift_table
 from restir_ref.batch import Array
 
 Command = Callable[[Sequence[str]], int]
@@ -54,6 +56,25 @@ def ladder_command(arguments: Sequence[str]) -> int:
         return 2
     print(found)
     return max(map(status, found.steps.values()), key=lambda each: (each == 1, each)) if found.steps else 0
+
+
+def shift_command(arguments: Sequence[str]) -> int:
+    """Hold laws against a table of a shift, and print which are kept."""
+    parser = argparse.ArgumentParser(
+        prog="python -m restir_ref.audit shift",
+        description="Hold laws against rows (x, y, J) of a shift: slope, way back, clamps.",
+        epilog="exit status: 0 right, 1 wrong or suspicious, 2 if the table cannot be read, 3 if it decides too little",
+    )
+    parser.add_argument(
+        "table", metavar="TABLE", help="a .csv, .npz or .json file: x[0], ..., y[0], ..., J, back, J_back"
+    )
+    try:
+        report = audit_shift_table(**shift_table(parser.parse_args(arguments).table))
+    except (BadDump, ValueError) as error:
+        print(f"cannot read the table: {error}", file=sys.stderr)
+        return 2
+    print(report)
+    return report.status
 
 
 def status(report: ImageReport) -> int:

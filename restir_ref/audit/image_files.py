@@ -101,11 +101,22 @@ def _exr(path: Path, png: Decode) -> Iterator[Array]:
         exr: Any = import_module("OpenEXR")
     except ImportError as error:
         raise BadImages(
-            f"{path.name} is EXR, which needs a reader: pip install OpenEXR; or write PFM or NPY."
+            f"{path.name} is EXR, which needs the package OpenEXR: install restir-ref with its extra 'exr', as in "
+            "pip install 'restir-ref[exr]'; or write PFM or NPY."
         ) from error
     channels = exr.File(str(path), separate_channels=True).channels()
-    names = [name for name in ("R", "G", "B") if name in channels] or sorted(channels)[:1]
-    return iter([np.stack([np.asarray(channels[name].pixels, dtype=float) for name in names], axis=-1)])
+    names = next((names for names in LIGHT if set(names) <= set(channels)), tuple(channels))
+    if not names or (len(names) > 1 and names not in LIGHT):
+        raise BadImages(
+            f"{path.name} has channels {', '.join(sorted(channels))[:100]}, and none of them is R, G, B or Y: write "
+            "the light into these, one image per file."
+        )
+    values = [np.asarray(channels[name].pixels, dtype=float) for name in names]
+    return iter([np.stack(values, axis=-1) if len(values) > 1 else values[0]])
+
+
+LIGHT = (("R", "G", "B"), ("Y",))
+"""Channels of an EXR that are read, beside a single one of whatever name; alpha and depth are left alone."""
 
 
 READERS: Mapping[str, Callable[[Path, Decode], Iterator[Array]]] = MappingProxyType(

@@ -60,7 +60,7 @@ def lookalikes(bias: Array, signatures: Iterable[Signature], tolerance: float) -
 
 def signatures(scene: Scene, tolerance: float) -> Iterator[Signature]:
     """Those of every bug in every loop that runs on this scene and is biased by nothing but the bug."""
-    table = cache(partial(_table, scene=scene))
+    table = cache(partial(table_of, scene=scene))
     for bug in BUGS.values():
         for loop, right, wrong in loops(bug):
             if _largest(table(right)) <= tolerance < _largest(table(wrong)):
@@ -71,7 +71,7 @@ def _largest(table: Array) -> float:
     return float(abs(table).max())
 
 
-def _table(parts: Parts, scene: Scene) -> Array:
+def table_of(parts: Parts, scene: Scene) -> Array:
     """Bias per cell of a loop; 0 everywhere if it cannot run on this scene, or not in time."""
     try:
         return bias_per_cell(expected_weight(parts(scene), scene.v, most_leaves=FEW_LEAVES), scene.v, scene.support)

@@ -388,9 +388,13 @@ def limits(dump: Dump) -> Iterator[Mistake]:
     for name in ("J", "W", "p_hat"):
         factor = getattr(p, name)
         used = np.where(expected > 0, factor * ratio(found["w"], expected), 0)[~p.canonical]
+        meant = np.where(expected > 0, factor, 0)[~p.canonical]
         high, low = plateau(used), plateau(-used[used > 0])
-        if high is not None or low is not None:
-            ends = (-low if low is not None else 0.0, high if high is not None else np.inf)
+        ends = (
+            -low if low is not None and meant[used > 0].min() < -low * (1 - ALIKE) else 0.0,
+            high if high is not None and meant.max() > high * (1 + ALIKE) else np.inf,
+        )
+        if ends != (0.0, np.inf) and ends[0] < ends[1] * (1 - ALIKE):
             bug = "Jacobian clamped in w" if name == "J" else ""
             said = " and ".join(
                 f"{word} {end:.6g}" for word, end in zip(("at least", "at most"), ends, strict=True) if 0 < end < np.inf

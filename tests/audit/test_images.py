@@ -1,5 +1,7 @@
 """Frames against a reference: biased where and by how much, unbiased to what, or undecided, and never by chance."""
 
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -246,6 +248,62 @@ def test_a_picture_for_screens_is_refused_unless_told(tmp_path) -> None:
     (coded,) = images(tmp_path / "a.png", DECODERS["srgb"])
     assert coded[0, 0, 0] == pytest.approx(0.2122, abs=2e-3)
     assert srgb(np.array([0.04, 1.0])) == pytest.approx([0.04 / 12.92, 1])
+
+
+exr = pytest.mark.skipif(find_spec("OpenEXR") is None, reason="needs the extra `exr`")
+
+
+def write_exr(path: Path, **channels: np.ndarray) -> None:
+    import OpenEXR  # noqa: PLC0415  (an extra)
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, channels).write(str(path))
+
+
+COLOURS = np.random.default_rng(3).random((5, 4, 3)).astype("f4")
+GREY, ALPHA = COLOURS[..., 0].copy(), np.ones((5, 4), "f4")
+CHANNELS = {
+    "colours": ({"RGB": COLOURS}, COLOURS),
+    "with alpha": ({"RGBA": np.concatenate([COLOURS, ALPHA[..., None]], axis=-1)}, COLOURS),
+    "one by one": ({name: COLOURS[..., k].copy() for k, name in enumerate("RGB")}, COLOURS),
+    "with depth": ({"RGB": COLOURS, "Z": ALPHA}, COLOURS),
+    "half": ({"RGB": COLOURS.astype("f2")}, COLOURS.astype("f2")),
+    "grey": ({"Y": GREY}, GREY),
+    "of another name": ({"radiance": GREY}, GREY),
+}
+
+
+@exr
+@pytest.mark.parametrize("name", CHANNELS)
+def test_an_exr_is_read_as_it_was_written(name, tmp_path) -> None:
+    channels, light = CHANNELS[name]
+    write_exr(tmp_path / "a.exr", **channels)
+    (found,) = images(tmp_path / "a.exr")
+    np.testing.assert_array_equal(found, light.astype(float))
+
+
+@exr
+def test_an_exr_whose_channels_are_no_light_is_refused(tmp_path) -> None:
+    write_exr(tmp_path / "a.exr", Z=GREY, variance=ALPHA)
+    with pytest.raises(BadImages, match=r"a\.exr has channels Z, variance, and none of them is R, G, B or Y"):
+        list(images(tmp_path / "a.exr"))
+
+
+@exr
+@pytest.mark.parametrize(("bias", "status"), [(1.0, 0), (1.1, 1)])
+def test_frames_and_reference_may_be_exr(bias, status, tmp_path) -> None:
+    (tmp_path / "frames").mkdir()
+    for k, frame in enumerate(rendered(bias, 0.1, 64, 0)):
+        write_exr(tmp_path / "frames" / f"{k:02}.exr", Y=frame.astype("f4"))
+    write_exr(tmp_path / "reference.exr", Y=TRUTH.astype("f4"))
+    assert main(["images", str(tmp_path / "frames"), str(tmp_path / "reference.exr")]) == status
+
+
+def test_without_its_reader_an_exr_is_refused_and_the_extra_named(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    (tmp_path / "a.exr").write_bytes(b"v/1\x01")
+    assert main(["images", str(tmp_path / "a.exr"), str(tmp_path / "a.exr")]) == 2
+    assert "install restir-ref with its extra 'exr'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["a.npy", "a.pfm", "a.npz", "a.tif", "a.png", "a.exr"])

@@ -10,7 +10,9 @@ from docs.site import api, check, code, evidence, gallery, layout, planted, stag
 from figures.report.glossary import PAPERS
 from restir_ref import Live, Pixels, initial
 from restir_ref.oracle.zoo import BUGS, INEFFICIENT
+from restir_ref.oracle.zoo.page import NOT_IN_THE_ZOO
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
+from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
 from tests.checkout import ROOT, plant
 
 BUILT = ROOT / "out-docs" / "html"
@@ -161,7 +163,7 @@ def test_the_worst_z_is_of_rows_that_ask_for_a_small_one() -> None:
 
 # ---------------------------------------------------------------- symptoms
 
-MISTAKES = (*BUGS, *INEFFICIENT, *TRANSPORT_BUGS)
+MISTAKES = (*NOT_IN_THE_ZOO, *BUGS, *INEFFICIENT, *TRANSPORT_BUGS, *CACHE_BUGS)
 
 
 def test_every_mistake_of_the_zoo_has_a_small_picture_on_the_page_of_symptoms() -> None:
@@ -172,6 +174,10 @@ def test_every_mistake_of_the_zoo_has_a_small_picture_on_the_page_of_symptoms() 
     for name, file in wanted.items():
         assert (folder / f"{name}.png").stat().st_size < 60_000
         assert page.count(f"]({file})") == 1, name
+
+
+def test_what_is_not_in_the_zoo_is_planted_too() -> None:
+    assert tuple(planted.OTHERS) == NOT_IN_THE_ZOO
 
 
 def few(monkeypatch) -> None:

@@ -98,7 +98,7 @@ def test_a_moved_scene_renders_the_same_and_its_shifts_are_right(at):
     assert unlike.mean() < 1e-3  # rays that pass an edge by less than the rounding of places
     assert image(there).mean() == pytest.approx(image(t).mean(), rel=1e-4)
     found = judge(PathIntegrals(there), Live(np.random.default_rng(1)), Effort(paths=5000, jacobians=80))
-    assert not found.red, report(found)
+    assert found.green, report(found)
 
 
 def test_a_scene_beyond_the_limit_is_refused_where_its_shifts_would_be_wrong(monkeypatch):

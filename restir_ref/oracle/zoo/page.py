@@ -9,6 +9,7 @@ import numpy as np
 from restir_ref.batch import Array
 from restir_ref.oracle.zoo.bug import Bug, exact_bias
 from restir_ref.oracle.zoo.checks import CHECKS, OUTSIDE, TOLERANCE, Found, examine
+from restir_ref.oracle.zoo.cures import CURES
 
 MEAN, VARIANCE = "mean with f = p_hat", "variance against the right loop"
 
@@ -43,41 +44,51 @@ FIRST = """
 BEFORE = (
     (
         "black or white blocks that grow from frame to frame and never go",
-        "NaN or infinity, from 0/0 of a null sample; reuse spreads it",
+        "**NaN spread by reuse**",
+        "0/0 of a null sample, or infinity from a density of 0; every pixel that reads it has it from then on",
         "test the target and the sum before dividing; W = 0 where either is 0; drop W that is not finite",
     ),
     (
-        "fireflies that come and go with distance or exposure",
+        "fireflies, or dark lamps, that come and go with distance or exposure",
+        "**W beyond half floats**",
         "half floats end at 65504 and lose everything below 6e-8",
         "scale p_hat; store W as float, or its logarithm",
     ),
     (
         "boiling: blotches that live for some frames, right in the mean",
-        "history of long confidence, few new samples",
+        "**history too long**",
+        "history of long confidence meets few new samples, and neighbours share it",
         "lower the cap; more candidates; [when reuse pays](when-reuse-pays.md)",
     ),
     (
         "the same with colours that stay for ever",
-        "no cap at all",
+        "no cap on history, [below](#noisy-smeared-or-frozen)",
+        "the confidence of history grows for ever",
         "cap the confidence of history, c <- min(c, M_c)",
     ),
     (
         "dark after some bounces, by a constant factor per bounce",
+        "roulette not compensated, [below](#dark)",
         "roulette that is not divided by its probability",
         "W /= q for the survivors",
     ),
     (
         "lamps without area too dark",
+        "lamp without area weighed against directions, [below](#dark)",
         "a delta light weighed against a density of directions",
         "weight 1 for what only one technique can find",
     ),
     (
         "as noisy with reuse as without it",
+        "reuse that does nothing, [below](#noisy-smeared-or-frozen)",
         "every neighbour is refused, or the result is not written back",
         "count the accepted neighbours; dump a pass",
     ),
 )
-"""What is no member of the zoo: what it looks like, what it is, the cure."""
+"""What to think of first: symptom, mistake, how it gets in, cure; with stars what is not in the zoo."""
+
+NOT_IN_THE_ZOO = tuple(name.strip("*") for _, name, _, _ in BEFORE if name.startswith("**"))
+"""Mistakes that no finite scene shows: their numbers, or their frames, are beyond it."""
 
 SECTIONS = {
     "Dark": "Energy is lost and nowhere gained.",
@@ -88,13 +99,13 @@ SECTIONS = {
 }
 
 BIASED_HEAD = """
-| what it looks like | mistake | how it gets in | breaks | cells | image | pointed at by |
-|---|---|---|---|---|---|---|
+| what it looks like | mistake | how it gets in | cure | breaks | cells | image | pointed at by |
+|---|---|---|---|---|---|---|---|
 """
 
 UNBIASED_HEAD = """
-| what it looks like | mistake | how it gets in | breaks | variance | pointed at by |
-|---|---|---|---|---|---|
+| what it looks like | mistake | how it gets in | cure | breaks | variance | pointed at by |
+|---|---|---|---|---|---|---|
 """
 
 CHECKS_HEAD = """
@@ -173,14 +184,14 @@ def page(bugs: Iterable[Bug]) -> str:
 
 def pieces(entries: list[Entry]) -> Iterator[str]:
     """The parts of the page in order."""
-    yield HEAD + FIRST + row(["what it looks like", "what it is", "cure"]) + row(["---"] * 3)
+    yield HEAD + FIRST + row(["what it looks like", "mistake", "how it gets in", "cure"]) + row(["---"] * 4)
     yield from map(row, BEFORE)
     for title, about in SECTIONS.items():
         members = [each for each in entries if each.section == title]
         yield f"\n## {title}\n\n{about}\n"
         yield UNBIASED_HEAD if title == list(SECTIONS)[-1] else BIASED_HEAD
         for each in sorted(members, key=lambda each: each.bug.symptom):
-            words = each.bug.symptom, f"**{each.bug.name}**", each.bug.story, each.bug.breaks
+            words = each.bug.symptom, f"**{each.bug.name}**", each.bug.story, CURES[each.bug.name], each.bug.breaks
             yield row([*words, *each.numbers, each.pointed_at_by])
     yield CHECKS_HEAD
     yield from (row([name, (getdoc(check) or "").splitlines()[0]]) for name, check in CHECKS.items())

@@ -4,6 +4,7 @@ Whatever maps paths to paths can be judged; nothing is compared with our own shi
 nearly blind to mistakes in shifts, for reuse is nearly symmetric.  `CHECKS` are not, and name a path.
 """
 
+import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from inspect import getdoc
@@ -67,6 +68,21 @@ class Judgement:
         """The checks that failed."""
         return tuple(name for name, found in self.findings.items() if found.red)
 
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """The checks that lack something; what, is in their findings."""
+        return tuple(name for name, found in self.findings.items() if found.undecided)
+
+    @property
+    def green(self) -> bool:
+        """All checks could be made, and none failed: the only acquittal."""
+        return not self.red and not self.undecided
+
+    @property
+    def status(self) -> int:
+        """The exit status of a script: 0 green, 1 red, 3 undecided."""
+        return 1 if self.red else 3 if self.undecided else 0
+
 
 USUAL = Effort()
 """A second or two."""
@@ -79,7 +95,9 @@ def judge(
     numbers: Numbers = primary_sample,
     checks: Mapping[str, Check] = CHECKS,
 ) -> Judgement:
-    """Hold checks against the shift of `of`; `numbers` says which primary sample an offset path has.
+    """Hold checks against the shift of `of`: green, red or undecided.
+
+    numbers  which primary sample an offset path has
 
     Raises ValueError for fewer than two pixels, and where J is negative, NaN or infinite.
 
@@ -92,8 +110,8 @@ def judge(
     >>> from restir_ref.transport.restir_pt import PathIntegrals
     >>> room, few = setting("crease"), Effort(paths=1000, jacobians=40)
     >>> t = Tracer(room.scene, room.pinhole(32), 2, Connectability(roughness=0.2, distance=0.02))
-    >>> judge(PathIntegrals(t), Live(np.random.default_rng(1)), few).red
-    ()
+    >>> judge(PathIntegrals(t), Live(np.random.default_rng(1)), few).green
+    True
     >>> careless = TRANSPORT_BUGS["geometric Jacobian left out"].wrong(t)
     >>> judge(careless, Live(np.random.default_rng(1)), few).red
     ('finite differences', 'change of variables')
@@ -107,21 +125,39 @@ def judge(
 
 
 def report(judgement: Judgement) -> str:
-    """All checks, and of each that failed the worst path."""
+    """The answer, then all checks: of each that failed the worst path, of each that is undecided what it takes."""
     t = judgement.of.tracer
-    return "\n".join(line for name, found in judgement.findings.items() for line in _lines(t, name, found))
+    lines = (line for name, found in judgement.findings.items() for line in _lines(t, name, found))
+    return "\n".join([_answer(judgement), *lines])
+
+
+def _answer(judgement: Judgement) -> str:
+    """WRONG, UNDECIDED or right, and by which checks."""
+    if judgement.red:
+        return f"WRONG: {', '.join(judgement.red)}"
+    if judgement.undecided:
+        return f"UNDECIDED: {', '.join(judgement.undecided)}"
+    return "right, as far as it was tested"
 
 
 def _lines(t: Tracer, name: str, found: Finding) -> Iterator[str]:
     law = (getdoc(CHECKS[name]) or "").split("\n")[0] if name in CHECKS else "a check of its own"
-    yield f"{'RED  ' if found.red else 'green'} {name}: {law}"
-    if not found.tested:
-        yield "      undecided: too few paths arrive, or too noisy; give it more paths, or a brighter scene"
-        return
-    yield f"      {found.failed} of {found.tested} fail, the worst error is {found.worst:.3g} times what is tolerated"
-    yield from (f"      {line}" for line in found.where.splitlines())
+    yield f"{found.answer:9} {name}: {law}"
+    yield from (f"{INDENT}{line}" for line in _tested(t, found))
+
+
+INDENT, WIDTH = 10 * " ", 110
+
+
+def _tested(t: Tracer, found: Finding) -> Iterator[str]:
+    """What was tested, what failed, and what is missing."""
+    if found.tested:
+        yield f"{found.failed} of {found.tested} fail, the worst error is {found.worst:.3g} times what is tolerated"
+    yield from found.where.splitlines()
+    if found.undecided:
+        yield from textwrap.wrap(f"needs more: {found.needs}", WIDTH)
     if found.red and found.offender is not None:
-        yield from (f"      {line}" for line in path_in_words(t, found.offender))
+        yield from path_in_words(t, found.offender)
 
 
 def path_in_words(t: Tracer, at: Offender) -> Iterator[str]:

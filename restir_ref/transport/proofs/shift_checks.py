@@ -116,11 +116,18 @@ class Offender:
     expected: float
 
 
+GREEN, RED, OPEN = "green", "RED", "undecided"
+"""The answers: the law holds as far as it was tested; it is broken; too little was tested to say either."""
+
+FEWEST = 10
+"""Fewer paths acquit nobody."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """How many were tested, broke the law, and may; the worst error in units of what is tolerated, and whose it is.
 
-    where  what else there is to say of those that were tested
+    where  what else there is to say of those that were tested;  needs  what more it takes to decide, "" if decided
     """
 
     tested: int
@@ -129,15 +136,27 @@ class Finding:
     worst: float
     offender: Offender | None = None
     where: str = ""
+    needs: str = ""
+
+    @property
+    def answer(self) -> str:
+        """GREEN, RED or OPEN: too many that fail are too many, however few were tested."""
+        return RED if self.red else OPEN if self.undecided else GREEN
 
     @property
     def red(self) -> bool:
-        """Too many failed, or nothing could be tested."""
-        return self.failed > self.allowed or not self.tested
+        """Too many failed."""
+        return self.failed > self.allowed
+
+    @property
+    def undecided(self) -> bool:
+        """Not red, and something is missing: neither an acquittal nor a conviction."""
+        return bool(self.needs) and not self.red
 
 
-UNDECIDED = Finding(0, 0, 0, np.inf)
-"""Too few paths, or too noisy: no acquittal."""
+def undecided(needs: str, where: str = "", tested: int = 0) -> Finding:
+    """Too few paths, or too noisy; needs  what would decide."""
+    return Finding(tested, 0, 0, np.inf, None, where, needs)
 
 
 # What was found and expected, quantity by quantity.
@@ -199,10 +218,26 @@ def finding(case: Case, at: Trial, quantities: list[Quantity]) -> Finding:
     failed, tested = int((error > 1).any(axis=0).sum()), error.shape[1]
     allowed, worst = case.effort.edge_cases * tested, float(error.max(initial=0))
     if not failed:
-        return Finding(tested, failed, allowed, worst)
+        return Finding(tested, failed, allowed, worst, needs=too_few(case, tested))
     which, n = divmod(int(error.argmax()), tested)
     what = quantities[which]
     return Finding(tested, failed, allowed, worst, offender(at, n, what.name, what.found[n], what.expected[n]))
+
+
+def too_few(case: Case, tested: int) -> str:
+    """What it takes to test FEWEST paths; "" if so many were."""
+    if tested >= FEWEST:
+        return ""
+    return (
+        f"{tested} of the {case.effort.paths} paths that were shifted could be tested, at least {FEWEST} are needed: "
+        f"{more_paths(case, 2 * FEWEST / max(tested, 1))}, a brighter scene, or pixels that are closer together"
+    )
+
+
+def more_paths(case: Case, times: float) -> str:
+    """The effort that has so many times as many paths, to two digits."""
+    paths = float(f"{case.effort.paths * max(times, 2):.1e}")
+    return f"Effort(paths={paths:_.0f})"
 
 
 def offender(at: Trial, n: int, what: str, found: float, expected: float) -> Offender:

@@ -16,7 +16,14 @@ import numpy as np
 from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Chance, Live
 from restir_ref.transport.paths import Path
-from restir_ref.transport.proofs.shift_checks import UNDECIDED, Case, Finding, Offender, pairs
+from restir_ref.transport.proofs.shift_checks import (
+    Case,
+    Finding,
+    Offender,
+    more_paths,
+    pairs,
+    undecided,
+)
 
 SIGMAS, NOISE, FEW, BLOCKS = 5.0, 0.05, 50, 4
 """Largest |z|; largest relative standard error of the whole; fewest paths of a kind; blocks of pixels."""
@@ -76,13 +83,26 @@ def change_of_variables(case: Case) -> Finding:
     i, j = pairs(case.of.n, np.full(case.effort.paths, min(case.effort.reach, case.of.n - 1)), case.chance)
     tape = Tape(case.chance)  # the same numbers in both pixels: what they share cancels
     left, right = _left(case, i, j, tape), _right(case, i, j, replace(tape, at=0))
-    means = [each for each in _means(left, right, i, j, case.of.n) if each.paths >= FEW]
-    if not means or means[0].error > NOISE * means[0].right:
-        return UNDECIDED
+    whole, *kinds = _means(left, right, i, j, case.of.n)
+    if needs := _lacking(case, whole):
+        return undecided(needs)
+    means = [whole, *(each for each in kinds if each.paths >= FEW)]
     worst = max(means, key=lambda mean: mean.z)
     failed = sum(mean.z > SIGMAS for mean in means)
     culprit = _culprit(left, right, worst, i, j) if failed else None
     return Finding(len(means), failed, 0, worst.z / SIGMAS, culprit)
+
+
+def _lacking(case: Case, whole: Mean) -> str:
+    """What it takes to compare the means of the whole: FEW paths, and NOISE at most; "" if nothing."""
+    if whole.paths < FEW:
+        few = f"paths that count: {whole.paths}, at least {FEW} are needed"
+        return f"{few}: {more_paths(case, 2 * FEW / max(whole.paths, 1))}, or a brighter scene"
+    if whole.error <= NOISE * whole.right:
+        return ""
+    noise = whole.error / whole.right if whole.right else np.inf
+    times = (noise / NOISE) ** 2 if whole.right else 10
+    return f"the means are known to {noise:.0%}, at most {NOISE:.0%} are needed: {more_paths(case, 1.2 * times)}"
 
 
 def _left(case: Case, i: Array, j: Array, tape: Tape) -> Side:

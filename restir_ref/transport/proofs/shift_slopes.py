@@ -10,7 +10,17 @@ import numpy as np
 
 from restir_ref.batch import Array, take
 from restir_ref.transport.proofs.inversion import traced
-from restir_ref.transport.proofs.shift_checks import DERIVATIVES, UNDECIDED, Case, Finding, Trial, finding, relative
+from restir_ref.transport.proofs.shift_checks import (
+    DERIVATIVES,
+    POSITIONS,
+    Case,
+    Finding,
+    Trial,
+    finding,
+    relative,
+    too_few,
+    undecided,
+)
 
 STRATA, EXTREMES = 10, 3
 """Strata of log J, and how many of the smallest and of the largest J are always among the paths."""
@@ -18,18 +28,38 @@ STRATA, EXTREMES = 10, 3
 
 def finite_differences(case: Case) -> Finding:
     """J = |det du^y / du^x|; where the differences of two steps disagree nothing is decided."""
+    if needs := too_few(case, len(case.good.J)):
+        return undecided(needs)
     at = take(case.good, spread(case.good, case.effort.jacobians))
     coarse, fine = (stretch(case, at, h) for h in (2 * case.effort.step, case.effort.step))
     decided = np.flatnonzero(np.abs(fine - coarse) <= DERIVATIVES * np.abs(fine))
-    if not len(decided) or 2 * len(decided) < len(fine):
-        return UNDECIDED
+    if 2 * len(decided) < len(fine):
+        return undecided(_unsteady(case, len(decided), len(fine)), f"no J tested; {_range(case.good.J)}")
     at, measured = take(at, decided), ((4 * fine - coarse) / 3)[decided]
     found = finding(case, at, [relative("J", at.J, measured, DERIVATIVES)])
     return replace(found, where=f"J tested from {at.J.min():.3g} to {at.J.max():.3g}; {_range(case.good.J)}")
 
 
+def _unsteady(case: Case, decided: int, measured: int) -> str:
+    """What it takes where differences depend on their step."""
+    step = case.effort.step
+    return (
+        f"differences with steps of {2 * step:g} and {step:g} agree in {decided} of {measured} paths, half of them are "
+        f"needed: another step, such as Effort(step={step / 10:g})"
+    )
+
+
 def _range(J: Array) -> str:
-    return f"{len(J)} paths have it from {J.min():.3g} to {J.max():.3g}"
+    repeated = [
+        f", {end:.3g} in {times} of them: a limit?" for end in (J.min(), J.max()) if (times := _times(J, end)) > 1
+    ]
+    said = f"{len(J)} paths have it from {J.min():.3g} to {J.max():.3g}"
+    return f"{said}{''.join(repeated)}; limits beyond show in other scenes only"
+
+
+def _times(J: Array, end: float) -> int:
+    """How often an end of J comes, if it is not 1, which many shifts have everywhere."""
+    return int(np.count_nonzero(end == J)) if abs(end - 1) > POSITIONS else 0
 
 
 def spread(of: Trial, most: int) -> Array:
