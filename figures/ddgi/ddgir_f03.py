@@ -355,8 +355,8 @@ FIGURE = Figure(
     claims=("DDGIR-F03", "DDGIR-C10"),
     presets={
         "quick": {
-            "per_unit": 8, "spacings": [8, 16], "caustic spacings": [4, 8, 16], "pixels": 32, "rays": 32,
-            "grids": 2, "few grids": 2, "tolerance": 0.1, "glass tolerance": 0.06, "traced": 0,
+            "per_unit": 8, "spacings": [8, 16], "caustic spacings": [4, 8, 16], "pixels": 16, "rays": 16,
+            "grids": 8, "few grids": 8, "tolerance": 0.3, "glass tolerance": 0.06, "traced": 0,
         },
         "paper": {
             "per_unit": 8, "spacings": [8, 16, 32], "caustic spacings": [4, 8, 16], "pixels": 64, "rays": 128,
