@@ -8,6 +8,8 @@ import pytest
 
 from figures.experiments.following import followed, views_of
 from figures.experiments.gradients import ADAPTIVE
+from figures.experiments.views import setting, standard
+from figures.gradient import gpt_f01 as row
 from figures.gradient import gpt_f07_3d as space
 from restir_ref.gradient_loop import GRADIENT, PRIMAL, Group
 from restir_ref.integrals import Reservoirs, Shifted
@@ -103,11 +105,27 @@ def test_errors_are_the_variance_at_equal_rays_and_the_bias_of_what_has_one(imag
     assert found == pytest.approx(2 * variance + expected)
 
 
+@pytest.mark.claims("COM-B15", part="the filter", world="tracer3d")
 def test_the_filter_averages_like_pixels_only():
     s, w = checker(), space.like("Checker3", 32)
-    i, j = np.indices(w.shape)
-    apart = unlike(seen(s.scene, followed(s, 32, 1)[0]), i.ravel(), j.ravel()).reshape(w.shape)
+    apart = unlike_pixels(s.scene, followed(s, 32, 1)[0])
     assert np.allclose(w.sum(axis=1), 1)
     assert apart.any()
     assert not w[apart].any()
     assert w[~apart].all()
+
+
+@pytest.mark.claims("COM-B15", part="the filter", world="flatland2d")
+def test_the_filter_of_a_row_averages_like_pixels_only():
+    s, sensor = setting("checker"), standard("checker")
+    w = row.filtered(np.eye(sensor.n)).T  # a filter of what is 1 in one pixel has its column of weights
+    apart = unlike_pixels(s.scene, sensor)
+    assert np.allclose(w.sum(axis=1), 1)
+    assert apart.any()
+    assert not w[apart].any()
+
+
+def unlike_pixels(scene, sensor):
+    """Which pixels see different things, (n, n)."""
+    i, j = np.indices((sensor.n, sensor.n))
+    return unlike(seen(scene, sensor), i.ravel(), j.ravel()).reshape(i.shape)
