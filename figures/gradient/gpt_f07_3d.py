@@ -26,12 +26,12 @@ from figures.experiments.replicas import few, smaller
 from figures.report import style
 from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Live
-from restir_ref.gradient_loop import GRADIENT, PRIMAL, Group, Parts, step
+from restir_ref.gradient_loop import GRADIENT, PRIMAL, Group, Parts, forward, step
 from restir_ref.integrals import Pixels, shifted, target
 from restir_ref.metrics import MAP, band_powers
 from restir_ref.poisson import ALPHA, l2
 from restir_ref.poisson_l1 import l1
-from restir_ref.transport.edges import seen, unlike
+from restir_ref.transport.edges import edges, seen, unlike
 from tracer3d.scenes import Setting, checker
 from tracer3d.sensors import Pinhole
 
@@ -338,7 +338,32 @@ def whole_pixels(a: Arrays) -> list[Claim]:
         of = {name: float(a[f"{STILL}.{scene}.{MOVED}.{name}"]) for name in (PRIMAL, "dx", "dy")}
         text = ", ".join(f"{name} {share:.1%}" for name, share in of.items())
         claims.append(Claim("GPT-F07", criteria.reported(text), f"{scene}, lost by a pixel to the right", reason=GONE))
+        text = ", ".join(f"{camera} {at_edges(a, scene, camera):.0%}" for camera in (MOVING, STILL))
+        part = f"{scene}, with: share of the variance of dx and dy that edge pairs carry"
+        claims.append(
+            Claim("GPT-F07", criteria.reported(text), part, reason=f"{edge_pairs(a, scene):.1%} of all pairs.")
+        )
     return claims
+
+
+def edge_of(a: Arrays, scene: str) -> dict[str, Array]:
+    """Which pairs of the last crop are edges, by direction."""
+    s = SCENES[scene]()
+    (sensor,) = followed(s, len(truth(a, scene)), 1)
+    return {name: edges(seen(s.scene, sensor), ends) for name, (ends, _) in forward(sensor.shape).items()}
+
+
+def edge_pairs(a: Arrays, scene: str) -> float:
+    """The share of edge pairs among all."""
+    return float(np.concatenate(list(edge_of(a, scene).values())).mean())
+
+
+def at_edges(a: Arrays, scene: str, camera: str) -> float:
+    """Their share of the variance of dx and dy with pair reuse."""
+    edge = edge_of(a, scene)
+    variance = {name: a[f"{camera}.{scene}.with.{name}"].var(axis=0) for name in edge}
+    whole = sum(float(each.sum()) for each in variance.values())
+    return sum(float(variance[name][at].sum()) for name, at in edge.items()) / whole
 
 
 GONE = "Samples, by p_hat W, that have less than a tenth of their target there; the film place in the pixel is kept."
