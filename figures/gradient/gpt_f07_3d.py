@@ -22,7 +22,7 @@ from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments import solid
 from figures.experiments.following import followed, frugal, views_of
 from figures.experiments.gradients import ADAPTIVE, METHODS, Method, averaged, spread, temporal_only
-from figures.experiments.replicas import few, smaller
+from figures.experiments.replicas import few
 from figures.report import style
 from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Live
@@ -287,7 +287,8 @@ def norms(a: Arrays, scene: str) -> list[Claim]:
     for method in METHODS:
         pair = (power(a, view, method, "L1")["total"], power(a, view, method, "L2")["total"])
         part = f"{MOVING}, {scene}, L1 / L2, {method}"
-        mine = smaller("GPT-C03", pair, 1, part) if (scene, method) == OUTLIERS else None
+        limited = (scene, method) == OUTLIERS and not few(pair[0])
+        mine = Claim("GPT-C03", criteria.ratio_below(*pair, 1), part, reason=OFTEN) if limited else None
         claims.append(mine or told("GPT-C03", pair, part))
     traced = a[f"{view}.path tracing.L1"]
     bias = f"{traced.mean() / truth(a, scene).mean() - 1:+.2%} of the image's mean"
@@ -300,6 +301,11 @@ def norms(a: Arrays, scene: str) -> list[Claim]:
 
 OUTLIERS = "Ajar3", "path tracing"
 """Where L1 is required to be better than L2: what comes through the slit is rare, and differences have outliers."""
+
+OFTEN = (
+    "L1 often has the lower error, says the paper, which one scene does not refute.  It goes to the median, and half of "
+    "the pixels of so few paths are black."
+)
 
 POOLED = "Against the mean of all L2 images."
 
