@@ -303,8 +303,8 @@ OUTLIERS = "Ajar3", "path tracing"
 """Where L1 is required to be better than L2: what comes through the slit is rare, and differences have outliers."""
 
 OFTEN = (
-    "L1 often has the lower error, says the paper, which one scene does not refute.  It goes to the median, and half of "
-    "the pixels of so few paths are black."
+    "L1 often has the lower error, says the paper, which one scene does not refute.  L1 goes to the median, and half "
+    "of the pixels of so few paths are black."
 )
 
 POOLED = "Against the mean of all L2 images."
