@@ -48,7 +48,7 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     views = [method.integrals(Tracer(scene, each, s.depth, method.rule)) for each in crops(preset)]
     if name == TRUTH:
         of, count = views[-1], preset["lattices"]
-        images = lattice_tracing(indirect_light)(of, np.arange(count * of.n), Live(rng))
+        images = lattice_tracing(indirect_light)(of, np.arange(count * of.n), Live(rng))  # type: ignore[arg-type]
         return {"images": images.reshape(count, -1)}
     *_, (images, cost) = realtime.costed(views, asked, preset["replicas"], Live(rng))
     return {"images": images, "rays": np.array(cost)}
