@@ -20,10 +20,14 @@ from figures.experiments.views import HYBRID, RULES, standard, view
 from restir_ref.chance import Live
 from restir_ref.transport.restir_pt import PathIntegrals
 
-SCENE, CHUNKS, FRAMES = "CB3", 64, 16
-"""1024 frames for each shift."""
-TRUTH, LATTICES, SMALL = "truth", 4, 12
-"""What chunks of the truth are called, how many lattices each has, and columns and rows of the piece."""
+SCENE, CHUNKS, FRAMES = "CB3", 256, 16
+"""4096 frames for each shift.
+
+Of 1024 the hybrid shift's mean was off by -.30 +- .09% and its slope -.90; other 4160 had +.05 +- .04%, so that a
+quarter is too few for a slope over two decades.
+"""
+TRUTH, TRUTHS, LATTICES, SMALL = "truth", 64, 4, 12
+"""What chunks of the truth are called, how many there are and how many lattices each has; columns, rows of the piece."""
 
 
 def piece(rule: str) -> PathIntegrals:
@@ -42,8 +46,9 @@ def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
 
 
 def chunks(share: float) -> Sequence[Params]:
-    """Chunk by chunk, the truth and both shifts in each."""
-    return [{"rule": rule, "part": part} for part in parts(CHUNKS, share) for rule in (TRUTH, *RULES)]
+    """The truth, then chunk by chunk both shifts in each."""
+    truth = [{"rule": TRUTH, "part": part} for part in parts(TRUTHS, share)]
+    return truth + [{"rule": rule, "part": part} for part in parts(CHUNKS, share) for rule in RULES]
 
 
 def judge(done: Done) -> Sequence[Row]:
