@@ -27,7 +27,7 @@ Of 1024 the hybrid shift's mean was off by -.30 +- .09% and its slope -.90; othe
 quarter is too few for a slope over two decades.
 """
 TRUTH, TRUTHS, LATTICES, SMALL = "truth", 64, 4, 12
-"""What chunks of the truth are called, how many there are and how many lattices each has; columns, rows of the piece."""
+"""What chunks of the truth are called, how many there are, how many lattices each has; the piece is a square."""
 
 
 def piece(rule: str) -> PathIntegrals:

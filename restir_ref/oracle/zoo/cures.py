@@ -10,7 +10,7 @@ CURES: Mapping[str, str] = MappingProxyType(
     {
         # shifts
         "Jacobian left out": "multiply w by J, and every density that MIS shifts by the J of the shift back",
-        "inverted Jacobian": "derive J = |dy/dx| for x -> y, then measure it by finite differences; w is times J, not over",
+        "inverted Jacobian": "derive J = |dy/dx| for x -> y, then measure it by differences; w is times J, not over",
         "Jacobian of another dimension": "the power of distances is d - 1: 2 in space, 1 in flatland; measure it",
         "rejection not mirrored": "refuse where J > r or 1/J > r, in the merge and in p_hat_from alike",
         "rejection unknown to MIS": "one function `shift` with all its tests, called by the merge and by MIS",
