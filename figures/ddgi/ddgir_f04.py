@@ -217,9 +217,9 @@ def draw(a: Arrays) -> "Picture":
     for what, axis in zip((1, 0), axes[0], strict=False):
         for light in (each for each in LIGHTS_OF if each in a):
             for k, how in enumerate(HOW):
-                look = style.nth(2 * LIGHTS_OF.index(light) + k, label=f"{light}, {how}")
+                look = style.nth(2 * LIGHTS_OF.index(light) + k, label=f"{light}, {how}", markevery=1)
                 axis.plot(a["roughness"], biases(a, light, what)[..., k].mean(axis=1), **look)
-        axis.set(xlabel="roughness of the boxes", ylabel="|error| / truth", ylim=(0, None))
+        axis.set(xlabel="roughness of the boxes", ylabel="|error| / truth", ylim=(0, 1.15 * axis.get_ylim()[1]))
         axis.set(title=f"Bias, pixels of the {SEEN[what]}")
         style.below(axis)
     rows = [*a["probes"][0].mean(axis=0), a["truth"][0]]
