@@ -213,7 +213,7 @@ def of_roughness(a: Arrays, what: int, r: float, k: int | None) -> Claim:
 
 def draw(a: Arrays) -> "Picture":
     """Bias over roughness, by what is seen, and the film with the most glossy boxes."""
-    picture, axes = style.panels(1, 3, width=4.4, height=3.4)
+    picture, axes = style.panels(1, 3, width=4.2, height=3.4)
     for what, axis in zip((1, 0), axes[0], strict=False):
         for light in (each for each in LIGHTS_OF if each in a):
             for k, how in enumerate(HOW):

@@ -166,7 +166,12 @@ def _numbers(name: str, values: Any) -> Array:
         whole = values.columns(0, values.shape[-1]) if isinstance(values, Stored) else np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise BadDump(f"{name} holds no table of numbers: write one number per row.") from error
-    return np.asarray(whole if name.startswith("J") else np.atleast_2d(whole), dtype=float)
+    return np.asarray(whole if name.startswith("J") else _rows(whole), dtype=float)
+
+
+def _rows(table: Array) -> Array:
+    """One row of numbers is a table (1, N)."""
+    return table if table.ndim > 1 else table[None]
 
 
 def _check(table: Mapping[str, Array]) -> None:
@@ -182,7 +187,7 @@ def _check(table: Mapping[str, Array]) -> None:
 
 def _sound(table: Mapping[str, Array]) -> Array:
     """Rows (N,) whose numbers are finite, and whose Jacobians are not negative."""
-    finite = np.stack([np.isfinite(np.atleast_2d(each)).all(axis=0) for each in table.values()]).all(axis=0)
+    finite = np.stack([np.isfinite(_rows(each)).all(axis=0) for each in table.values()]).all(axis=0)
     return np.asarray(finite & (table["J"] >= 0) & (table.get("J_back", table["J"]) >= 0))
 
 

@@ -137,7 +137,8 @@ def corrected_by_place(candidates, chance, c) -> Reservoirs:
     s = chance.choose(w)
     W = ratio(w.sum(axis=0), pick([each.p_hat for each in offered], s))
     listed = [each.c_over_m for each in offered if each.c_over_m is not None]
-    return Reservoirs(pick([each.x for each in offered], s), W * pick(listed, s), c)
+    anew = np.where(s < len(listed), s, 0)
+    return Reservoirs(pick([each.x for each in offered], s), W * pick(listed, anew), c)
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (0, 2, 1, 3)])

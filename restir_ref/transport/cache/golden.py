@@ -7,6 +7,7 @@ inputs by one rounding of float32 does.
 
 import argparse
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -161,4 +162,22 @@ def main(volumes: Mapping[str, Volume], shipped: Path, arguments: Sequence[str] 
     if not options.check:
         options.file.write_text(text(volumes), encoding="utf-8")
         return 0
-    return int(not options.file.exists() or options.file.read_text(encoding="utf-8") != text(volumes))
+    return int(
+        not options.file.exists()
+        or not alike(json.loads(options.file.read_text(encoding="utf-8")), json.loads(text(volumes)))
+    )
+
+
+def alike(a: Any, b: Any) -> bool:
+    """Whether two things that JSON holds are the same, numbers to ROUNDINGS: other processors add in another order."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(alike(a[key], b[key]) for key in a)
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(map(alike, a, b))
+    if isinstance(a, float) and isinstance(b, float):
+        return math.isclose(a, b, rel_tol=ROUNDINGS, abs_tol=ROUNDINGS)
+    return type(a) is type(b) and bool(a == b)
+
+
+ROUNDINGS = 1e-12
+"""Thousands of roundings of 64 bits, and a ten thousandth of the tolerances that go with the vectors."""

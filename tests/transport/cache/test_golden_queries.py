@@ -120,9 +120,18 @@ def test_what_ships_is_what_would_be_written(name, tmp_path):
     world = WORLDS[name]
     assert golden.main(world.VOLUMES, world.SHIPPED, ["--check"]) == 0
     assert golden.main(world.VOLUMES, world.SHIPPED, [str(tmp_path / "other.json")]) == 0
-    assert (tmp_path / "other.json").read_text() == world.SHIPPED.read_text()
+    assert golden.alike(json.loads((tmp_path / "other.json").read_text()), FILES[name])
     (tmp_path / "other.json").write_text("{}")
     assert golden.main(world.VOLUMES, tmp_path / "other.json", ["--check"]) == 1
+
+
+def test_a_rounding_is_no_change_and_everything_else_is():
+    said = {"a": [1.0, 0.25, 3], "b": ["x", None]}
+    assert golden.alike(said, {"a": [1.0 + 2e-16, 0.25, 3], "b": ["x", None]})
+    changes = ([1.0 + 1e-9, 0.25, 3], [1.0, 0.25], [1.0, 0.25, 3.0], [1.0, 0.25, 4])
+    assert not any(golden.alike(said, {"a": each, "b": ["x", None]}) for each in changes)
+    assert not golden.alike(said, {"a": said["a"], "b": ["y", None]})
+    assert not golden.alike(said, {"a": said["a"]})
 
 
 @pytest.mark.parametrize(("name", "k"), CASES)

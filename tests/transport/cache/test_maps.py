@@ -98,8 +98,8 @@ def test_what_is_gathered_are_shares_of_rays(name):
 
 
 def test_texels_that_no_ray_tells_of_are_named():
-    shares, known = gathering(Bins(4), turned(np.array([1 / 8])), 1)
-    assert known.tolist() == [True, False, False, False]
+    shares, known = gathering(Bins(4), turned(np.array([0.1])), 1)
+    assert known.tolist() == [True, False, False, True]
     np.testing.assert_array_equal(shares[:, ~known], 0)
 
 
