@@ -237,7 +237,8 @@ def put(batch: Batch, columns: Array, values: Batch) -> None:
 def pick(batches: Sequence[Batch], s: Array) -> Batch:
     """Column n of batches[s[n]], gathered; s (N,) integers below len(batches).
 
-    One `take` from leaves side by side: as fast as `where` for two of them, twice as fast for more.
+    One `take` from leaves side by side: twice as fast as a chain of `where` for three and more of 8000 columns, and
+    slower for few columns.
     """
     n = len(s)
     column = s.astype(int) * n + np.arange(n)

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from figures.claims import criteria
+from figures.claims.figure import Claim
+from figures.ddgi import ddgir_f03
 from figures.ddgi.ddgir_f05 import ALONG, OFF, ROOMS, UNMOVED
 from figures.experiments.alignments import (
     ROOMS as KINDS,
@@ -102,3 +105,13 @@ def test_what_is_caused_is_a_part_of_what_leaks_and_that_of_all_that_is_told(nam
         caused, leak, told = (a[f"{way} {what}"] for what in ("caused", "leak", "all"))
         assert (caused <= leak + 1e-12).all()
         assert (leak <= told + 1e-12).all()
+
+
+@pytest.mark.parametrize(("grids", "judged"), [(15, False), (16, True)])
+def test_leaks_are_judged_from_sixteen_grids_on(monkeypatch, grids, judged):
+    for name in ("controls", "sharper", "missed"):
+        monkeypatch.setattr(ddgir_f03, name, lambda a: [])
+    monkeypatch.setattr(ddgir_f03, "of_gap", lambda a, gap: [Claim("DDGIR-F03", criteria.below(0.5, 1), f"{gap}")])
+    found = ddgir_f03.check({f"gap {ddgir_f03.SHOWN:g} primary": np.zeros((grids, 4))})
+    assert [claim.outcome is not None for claim in found] == [judged] * len(ddgir_f03.GAPS)
+    assert all(claim.outcome or claim.reason for claim in found)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from figures.claims import criteria
+from figures.claims.figure import Claim
 from figures.experiments.following import followed, views_of
 from figures.experiments.gradients import ADAPTIVE
 from figures.experiments.views import setting, standard
@@ -129,3 +131,18 @@ def unlike_pixels(scene, sensor):
     """Which pixels see different things, (n, n)."""
     i, j = np.indices((sensor.n, sensor.n))
     return unlike(seen(scene, sensor), i.ravel(), j.ravel()).reshape(i.shape)
+
+
+@pytest.mark.parametrize("id_", ["GPT-F01", "GPT-F07", "GPT-F08"])
+def test_in_motion_nothing_is_judged_whether_it_passes_or_fails(monkeypatch, id_):
+    outcomes = criteria.below(0.5, 1), criteria.below(2, 1)
+    parts = [
+        Claim(id_, outcome, f"{camera}, {k}") for camera in ("moving", "still") for k, outcome in enumerate(outcomes)
+    ]
+    for name in ("images", "norms", "filters"):
+        monkeypatch.setattr(space, name, lambda a, scene: [])
+    monkeypatch.setattr(space, "differences", lambda a, scene: parts)
+    monkeypatch.setattr(space, "scenes_of", lambda a: ["CB3"])
+    monkeypatch.setattr(space, "whole_pixels", lambda a: [])
+    found = space.check({})
+    assert [claim.outcome and claim.outcome.passed for claim in found] == [None, None, True, False]
