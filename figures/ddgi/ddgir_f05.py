@@ -140,6 +140,8 @@ def draw(a: Arrays) -> "Picture":
         above.set(xlabel="pixel", ylabel="indirect radiance", title=f"{name}: {JUDGED:g} per unit")
         below.set(xlabel="probe spacing (scene units)", ylabel="leaks over true light", title=name)
         below.set(xscale="log", yscale="log")
+        low, high = np.log10(below.get_ylim())
+        below.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))
         below.set_xticks(a["spacings"], [f"1/{1 / each:g}" for each in a["spacings"]])
         below.minorticks_off()
         style.below(above, ncols=1)

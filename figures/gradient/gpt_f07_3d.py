@@ -423,6 +423,7 @@ def by_camera(axis: Any, found: Callable[[str], Mapping[str, float]], scene: str
             axis.bar(k + 0.2 * (j - 1.5), each, 0.18, **style.bar(name, label=name if k == 0 else "_"))
     axis.set_xticks([0, 1], [MOVING, STILL])
     axis.set(yscale="log", xlabel="camera")
+    axis.set_ylim(bottom=min(bar.get_height() for bar in axis.patches) / 2)
     axis.grid(axis="x", visible=False)
 
 
