@@ -179,14 +179,9 @@ def whole_trees(views: Sequence[View], asked: Counter[str], replicas: int, chanc
     trees = grown(seen_once, np.arange(replicas * n), chance)
     found = {PRIMAL: grey(radiance_of(trees), replicas)}
     for name, (ends, _) in forward(view[PRIMAL].shape).items():
-        i, j = (Pixels(seen_once, columns_of(end, n, replicas)) for end in ends)
-        found[name] = grey(difference(trees, i, j), replicas)
+        i, j = ((np.arange(replicas)[:, None] * n + end).ravel() for end in ends)
+        found[name] = grey(difference(trees, Pixels(seen_once, i), Pixels(seen_once, j)), replicas)
     return found | {"rays": np.array(rays(asked) / (replicas * n))}
-
-
-def columns_of(pixels: Array, n: int, replicas: int) -> Array:
-    """The columns of some pixels in every replica of an image of n."""
-    return np.asarray((np.arange(replicas)[:, None] * n + pixels).ravel())
 
 
 def differences(view: View, X: Reservoirs, replicas: int) -> Arrays:
@@ -194,7 +189,7 @@ def differences(view: View, X: Reservoirs, replicas: int) -> Arrays:
     image, n = view[PRIMAL].of[PRIMAL], view[PRIMAL].n
     found = {PRIMAL: grey(shade(X, Pixels(image, np.arange(replicas * n))), replicas)}
     for name, (ends, _) in forward(view[PRIMAL].shape).items():
-        i, j = (columns_of(end, n, replicas) for end in ends)
+        i, j = ((np.arange(replicas)[:, None] * n + end).ravel() for end in ends)
         found[name] = grey(gradient_after(X, Pixels(image, i), Pixels(image, j)), replicas)
     return found
 
