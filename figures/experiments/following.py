@@ -8,7 +8,7 @@ import numpy as np
 
 from figures.experiments.gradients import Spatial
 from figures.experiments.pans import paired
-from restir_ref.area import one_by_area
+from restir_ref.area import moving, one_by_area
 from restir_ref.gradient_loop import GradientPreset, View
 from restir_ref.transport.rays import arrive
 from tracer3d.scenes import INSET, Setting
@@ -42,4 +42,4 @@ def views_of(
 
 def frugal(view: View) -> View:
     """The same with one of the overlapped previous pixels, chosen by its share of the area."""
-    return {name: replace(group, overlap=one_by_area) for name, group in view.items()}
+    return {name: replace(group, follow=moving(one_by_area)) for name, group in view.items()}
