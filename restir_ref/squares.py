@@ -8,9 +8,9 @@ overlaps, and the integral over S is the sum of those over its parts.  So it has
 
 m = 1 is right since a place of S lies in one q only, whose sample alone can be there; samples elsewhere are rejected.
 Nothing moves but by the motion, and the price is that of one pixel: one shift there, and for the weights one back, to
-the q that holds the new sample's place.  Of M pixels that are alike 1 sample is kept on average, whatever the fraction;
-at halves of a pixel none at all in (3/4)^4 of the cases.
-(The paper refers to Area ReSTIR, whose option "Rejection, 2 RIS" this is: the words are ours.)
+the q that holds the new sample's place.  1 sample is kept on average, whatever the fraction, and often none or several,
+so that of pixels that are all alike the sum of what is kept has the variance 1 - sum b^2 of its mean squared.
+(The paper refers to Area ReSTIR, one of whose options this is: the words are ours.)
 """
 
 from collections.abc import Iterator, Sequence
