@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from restir_ref.area import MOVED, Following
+from restir_ref.area import Following
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.gradient_loop import (
@@ -27,24 +27,24 @@ PAN = np.array([0.3, -0.4])
 """Pixels per frame, to the right and down."""
 
 PERIOD = 5.2
-"""Of the squares on the sheet, in pixels."""
+"""Of the sheet's waves, in pixels."""
 
 
 def wave(x: Array) -> Array:
-    """1 in one half of every period, -1 in the other."""
-    return np.where(x % PERIOD < PERIOD / 2, 1.0, -1.0)
+    """sin(2 pi x / PERIOD)."""
+    return np.sin(2 * np.pi * x / PERIOD)
 
 
 def primitive(x: Array) -> Array:
-    """int_0^x of the wave."""
-    return PERIOD / 2 - abs(x % PERIOD - PERIOD / 2)
+    """int_0^x of the wave, up to a constant."""
+    return -PERIOD / (2 * np.pi) * np.cos(2 * np.pi * x / PERIOD)
 
 
 @dataclass(frozen=True, eq=False)
-class Board:
-    """A checkered sheet behind a film at `corner`: f = (1 + .5 prod of waves) 2 s, a sample is (u, s) in [0, 1)^(d+1).
+class Sheet:
+    """A sheet of waves behind a film at `corner`: f = (1 + .9 prod of waves) (.5 + s).
 
-    Shifts copy all numbers, so that J = 1.
+    A sample is (u, s) in [0, 1)^(d+1); shifts copy all numbers, so that J = 1.
     """
 
     shape: tuple[int, ...]
@@ -63,7 +63,7 @@ class Board:
 
     def target(self, index: Array, x: Array) -> Array:
         at = self.pixel(index) + x[:-1] + self.corner[:, None]
-        return (1 + 0.5 * wave(at).prod(axis=0)) * 2 * x[-1]
+        return (1 + 0.9 * wave(at).prod(axis=0)) * (0.5 + x[-1])
 
     def contribution(self, index: Array, x: Array) -> Array:
         return self.target(index, x)[None]
@@ -80,13 +80,14 @@ class Board:
     def image(self) -> Array:
         """The integral of every pixel, in closed form; (n,)."""
         low = self.pixel(np.arange(self.n)) + self.corner[:, None]
-        return 1 + 0.5 * (primitive(low + 1) - primitive(low)).prod(axis=0)
+        return 1 + 0.9 * (primitive(low + 1) - primitive(low)).prod(axis=0)
 
 
-PRESET = GradientPreset(Preset(1, 1, 1, 2, 10.0), Preset(1, 1, 1, 2, 10.0))
+PRESET = GradientPreset(Preset(1, 0, 1, 2, 2.0), Preset(1, 0, 1, 2, 2.0))
+"""Reuse in time alone, of a short history: rejection makes noise in every frame, and 2% are to be seen."""
 
 
-def view(of: Board, follow: Following) -> dict[str, Group]:
+def view(of: Sheet, follow: Following) -> dict[str, Group]:
     around = random_in_disk(of.shape) if len(of.shape) == 2 else random_in_row
     motion, everybody = np.tile(PAN[: len(of.shape), None], of.n), np.ones(of.n, dtype=bool)
     found = {PRIMAL: Group({PRIMAL: of}, of.shape, motion, around, everybody, follow)}
@@ -101,7 +102,7 @@ def rendered(shape: tuple[int, ...], frames: int, follow: Following, replicas: i
     """Estimates (R, n) and the truth of every group after so many frames."""
     chance, last = Live(np.random.default_rng(frames)), None
     for k in range(frames):
-        of = Board(shape, (k - frames) * PAN[: len(shape)])
+        of = Sheet(shape, (k - frames) * PAN[: len(shape)])
         now = view(of, follow)
         last = now, step(now, chance, PRESET, replicas, last)
     image = of.image()
@@ -115,25 +116,22 @@ def probe(estimates: Array, truth: Array) -> tuple[float, float]:
     return float(found.mean()), float(found.std(ddof=1) / np.sqrt(len(found)))
 
 
-FOLLOWING = {"kept": keeping, "moved": MOVED}
+SEEN = 0.02 / 3
+"""The error at which a bias of 2% is three of them."""
+
+REPLICAS = {1: 400, 5: 160, 20: 160}
+"""By frames."""
 
 
 @pytest.mark.claims("GPT-A02", "GPT-A05", part="differences to 2%, a pan by fractions")
-@pytest.mark.parametrize("follow", FOLLOWING.values(), ids=FOLLOWING)
-@pytest.mark.parametrize("frames", [1, 5, 20])
-def test_differences_of_a_map_under_a_pan_by_fractions_are_unbiased_to_2_percent(frames, follow) -> None:
-    for name, (estimates, truth) in rendered((9, 10), frames, follow, 250).items():
+@pytest.mark.parametrize("shape", [(7, 8), (40,)])
+@pytest.mark.parametrize("frames", REPLICAS)
+def test_differences_under_a_pan_by_fractions_are_unbiased_to_2_percent(frames, shape) -> None:
+    found = rendered(shape, frames, keeping, REPLICAS[frames])
+    assert [*found] == [PRIMAL, "dx", "dy"][: 1 + len(shape)]
+    for name, (estimates, truth) in found.items():
         mean, error = probe(estimates, truth)
-        assert error < 0.005, name
-        assert abs(mean) < 0.02, name
-
-
-@pytest.mark.claims("GPT-A02", "GPT-A05", part="differences to 2%, a pan by fractions")
-@pytest.mark.parametrize("frames", [1, 5, 20])
-def test_differences_of_a_row_under_a_pan_by_fractions_are_unbiased_to_2_percent(frames) -> None:
-    for name, (estimates, truth) in rendered((40,), frames, keeping, 400).items():
-        mean, error = probe(estimates, truth)
-        assert error < 0.005, name
+        assert error < SEEN, name
         assert abs(mean) < 0.02, name
 
 
@@ -146,7 +144,7 @@ class Everything(Squares):
 
 def test_differences_that_keep_all_samples_are_noticed(monkeypatch) -> None:
     monkeypatch.setattr("restir_ref.squares.Squares", Everything)
-    found = rendered((9, 10), 5, keeping, 60)
+    found = rendered((7, 8), 5, keeping, 160)
     for name in ("dx", "dy"):
         mean, error = probe(*found[name])
         assert abs(mean) > 0.02 + 4 * error, name
