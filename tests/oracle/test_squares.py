@@ -11,7 +11,7 @@ from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.gradient import SIGNS
 from restir_ref.gradient_loop import ACROSS_SIGNS, PRIMAL, SAME_SIGN, Group, first, in_time, pairs_of, sampled, step
-from restir_ref.integrals import NOWHERE, Pixels, Shifted
+from restir_ref.integrals import NOWHERE, Pixels, Shifted, target
 from restir_ref.loop import Preset
 from restir_ref.mis import WEIGHTS
 from restir_ref.oracle.laws import bias_of, expected_sum
@@ -194,6 +194,8 @@ def test_squares_are_integrals_of_the_previous_frame_over_pixels_that_are_not_wh
     light = (before.cells.f * before.cells.v)[:2].reshape(2, 2, -1).sum(axis=-1)  # pixel, half
     inner = light[0, 1] + light[1, 0]
     assert expected_sum(image, 2)[0] == pytest.approx([inner, inner], rel=1e-12)
+    squares = Squares(before, (2,), -HALF)  # half of either square is beyond the border
+    assert expected_sum(image, 2)[0] == pytest.approx([light[0, 0], light[1, 1]], rel=1e-12)
 
 
 @dataclass(frozen=True)
@@ -300,6 +302,39 @@ def test_a_sample_that_is_kept_is_the_previous_frames_own_in_the_pixel_that_held
     assert squares.within(index, x.x, x.column)[chosen].all()
 
 
+def test_the_sum_of_what_is_kept_is_what_the_chosen_sample_carries() -> None:
+    """p_hat(Y) W_Y = sum of p_hat_q W_q over the samples in the square: it is chosen by this weight."""
+    before, index = placed_scene(3).frames[0], np.arange(2 * 50)
+    Y = initial(Pixels(before, index), Live(np.random.default_rng(1)))
+    at = Pixels(Squares(before, (2,), HALF), index)
+    (found,) = in_squares(Y, at, Live(np.random.default_rng(2)))
+    mass = target(Pixels(before, index), Y.x) * Y.W
+    right = before.place(Y.x)[0] > 0.5
+    kept_of = [np.where(right, mass, 0)[0::2], np.where(right, 0, mass)[1::2]]
+    assert target(at, found.X.x) * found.X.W == pytest.approx(np.repeat(sum(kept_of), 2), rel=1e-12)
+    both = np.repeat((kept_of[0] > 0) & (kept_of[1] > 0), 2)
+    assert 5 < both.sum() < 95
+
+
+def test_history_kept_in_place_is_capped_when_it_comes_in() -> None:
+    scene, index, chance = placed_scene(1), np.arange(2), Live(np.random.default_rng(1))
+    X, Y = (initial(Pixels(frame, index), chance) for frame in (scene.now, scene.frames[0]))
+    here, at = Pixels(Carried(scene.now, HALF), index), Pixels(Squares(scene.frames[0], (2,), HALF), index)
+    assert area_rejection(X, here, replace(Y, c=9.0 * Y.c), at, chance, cap=2.0).c.tolist() == [3.0, 3.0]
+
+
+@pytest.mark.claims("GPT-A09", part="whose reservoirs are asked")
+@pytest.mark.parametrize(("partners", "count"), [(SAME_SIGN, 1), (ACROSS_SIGNS, 2)], ids=["same sign", "across signs"])
+def test_squares_of_every_partner_are_asked(partners, count) -> None:
+    scene, index, chance = placed_scene(1), np.arange(2), Live(np.random.default_rng(1))
+    before, now = (group(pairs_of(frame, RING, partners)) for frame in scene.frames)
+    X, Y = (
+        first(at, index, sampled(of, chance, 1, 1), chance) for at, of in ((now, scene.now), (before, scene.frames[0]))
+    )
+    found = in_time(now, X, (before, Y), PRESET.pairs, partners, chance)
+    assert all(each.c.tolist() == [1.0 + count] * 2 for each in found.values())
+
+
 def test_there_and_back_is_the_same_place_of_the_same_pixel() -> None:
     before, now = placed_scene(0).frames
     squares, here = Squares(before, (2,), HALF), Carried(now, HALF)
@@ -319,6 +354,18 @@ def test_where_nothing_was_seen_there_is_no_history() -> None:
     gone = Squares(of, (1, 3), np.full((2, 3), 7.0))
     assert in_squares(initial(Pixels(of, index), Live(np.random.default_rng(1))), Pixels(gone, index), Live(None)) == []
     assert (gone.holder(index, np.full((2, 3), 0.5)) == NOWHERE).all()
+    unknown = Squares(of, (1, 3), np.array([[0.0, np.inf, 0.0], [0.0, 0.0, np.inf]]))
+    assert unknown.holder(index, np.full((2, 3), 0.5)).tolist() == [0, NOWHERE, NOWHERE]
+
+
+def test_what_is_kept_follows_the_motion_to_the_right_and_not_to_the_left() -> None:
+    of, index = sheet(1, 4), np.arange(4)
+    by = np.array([[0.25], [0.0]]) * np.ones(4)
+    squares, here = Squares(of, (1, 4), by), Carried(of, by)
+    x = np.array([[0.5, 0.9, 0.1, 0.3], [0.5] * 4])
+    y = squares.shift(Held(x, index), index, Pixels(here, index)).x
+    assert y[0] == pytest.approx([0.25, 0.65, 0.85, 0.05])
+    assert here.shift(y, index, Pixels(squares, index)).x.x == pytest.approx(x)
 
 
 # ---------------------------------------------------------------- gradient frames
