@@ -77,11 +77,11 @@ class Squares:
 
     def within(self, index: Array, x: Sample, column: Array) -> Array:
         """Whether a sample of `column`, or of nobody, lies in the square of `index`; (N,)."""
-        by, known = _known(self.by, index)
+        by, _ = _known(self.by, index)
         extents, strides = (each[:, None] for each in lattice(self.shape))
         step = np.maximum(column, 0) // strides % extents - index // strides % extents
         inside = np.floor(self.of.place(x) + (step - by)) == 0
-        return np.asarray(inside.all(axis=0) & known & (column != NOWHERE))
+        return np.asarray(inside.all(axis=0) & (column != NOWHERE))
 
     def holder(self, index: Array, place: Array) -> Array:
         """The column that holds what is at `place` (film, N) of pixels `index` now, or `NOWHERE`; (N,)."""

@@ -513,7 +513,7 @@ FIGURE = Figure(
     arm="method",
     presets={
         "quick": {"scenes": ["CB3", "Ajar3", "Checker3"], "replicas": 2, "blocks": 1, "side": 6, "frames": 2},
-        "paper": {"scenes": ["CB3", "Ajar3", "Checker3"], "replicas": 16, "blocks": 2, "side": 32, "frames": 8},
+        "paper": {"scenes": ["CB3", "Ajar3", "Checker3"], "replicas": 16, "blocks": 4, "side": 32, "frames": 8},
     },
     chunks=chunks,
     compute=compute,
