@@ -492,7 +492,9 @@ def by_camera(axis: Any, found: Callable[[str], Mapping[str, float]], scene: str
             axis.bar(k + 0.2 * (j - 1.5), each, 0.18, **style.bar(name, label=name if k == 0 else "_"))
     axis.set_xticks([0, 1, 2], ["by halves", "by fifths", STILL])
     axis.set(yscale="log", xlabel="camera moves")
-    axis.set_ylim(bottom=min(bar.get_height() for bar in axis.patches) / 2)
+    heights = [bar.get_height() for bar in axis.patches]
+    axis.set_ylim(10 ** np.floor(np.log10(min(heights) / 2)), 10 ** np.ceil(np.log10(max(heights))))
+    axis.minorticks_off()
     axis.grid(axis="x", visible=False)
 
 
