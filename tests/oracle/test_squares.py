@@ -278,7 +278,7 @@ def test_what_is_kept_costs_the_shifts_of_one_pixel_and_what_is_moved_of_all() -
 FOLLOWING = {"kept": keeping, "one": moving(one_by_area), "moved": MOVED}
 
 
-def test_one_sample_is_kept_on_average_and_at_halves_none_in_81_of_256_cases() -> None:
+def test_one_sample_is_kept_on_average_with_a_variance_of_1_less_the_squared_shares() -> None:
     of, n = sheet(5, 5), 25
     middle, index = 12, np.arange(25 * 4000)
     for by, none in ((np.full((2, n), 0.5), 0.75**4), (np.array([[0.25], [0.0]]) * np.ones(n), 3 / 16)):
@@ -287,6 +287,8 @@ def test_one_sample_is_kept_on_average_and_at_halves_none_in_81_of_256_cases() -
         W = found.X.W[index % n == middle]
         assert W.mean() == pytest.approx(1, abs=0.06)
         assert (W == 0).mean() == pytest.approx(none, abs=0.03)
+        shares = ((by[:, middle] ** 2) + (1 - by[:, middle]) ** 2).prod()
+        assert W.var() == pytest.approx(1 - shares, abs=0.07)
 
 
 def test_a_sample_that_is_kept_is_the_previous_frames_own_in_the_pixel_that_held_it() -> None:
