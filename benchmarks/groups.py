@@ -257,6 +257,7 @@ THEORY = (
     "windows",
     "images",
     "area",
+    "squares",
     "gradient",
     "gradient_loop",
     "poisson",

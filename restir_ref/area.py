@@ -22,11 +22,14 @@ from restir_ref.chance import Chance
 from restir_ref.integrals import NOWHERE, Image, Pixels, Reservoirs, Sample, Shifted
 from restir_ref.mis import WEIGHTS, Weights
 from restir_ref.resampling import Input, gris
-from restir_ref.restir import M_CAP, capped, reusing
+from restir_ref.restir import M_CAP, capped, entering, reusing
 
 
 class Film(Image, Protocol):
     """An image whose samples have a place on the film, in [0, 1) of their pixel along every axis."""
+
+    def place(self, x: Sample) -> Array:
+        """The place of x in its pixel; (film, N)."""
 
     def displaced(self, x: Sample, by: Array) -> Sample:
         """x with its place moved by `by` (film, N) pixels, of which whole ones are left out; x is not changed."""
@@ -66,6 +69,12 @@ class Displaced:
         return self.of.shift(self.of.displaced(x, step), index, Pixels(there.of, to.index))
 
 
+def lattice(shape: Sequence[int]) -> tuple[Array, Array]:
+    """How many pixels there are along every axis, the last one of the shape first, and how far apart their columns."""
+    extents = np.array(shape[::-1])
+    return extents, np.cumprod([1, *extents[:-1]])
+
+
 Source = tuple[Array, Array]
 """For every column a column of the previous frame, or `NOWHERE`, and its share b of the area; (N,) each."""
 
@@ -77,8 +86,7 @@ def overlapped(shape: Sequence[int], by: Array, index: Array) -> list[Source]:
     the image has no column: it was not seen, or by somebody else.
     Raises ValueError for displacements of another number of axes.
     """
-    extents = np.array(shape[::-1])
-    strides = np.cumprod([1, *extents[:-1]])
+    extents, strides = lattice(shape)
     if len(by) != len(extents):
         raise ValueError(f"a film of shape {tuple(shape)} has {len(extents)} axes, but displacements have {len(by)}.")
     by = by[:, index % by.shape[-1]]
@@ -116,6 +124,42 @@ def one_by_area(sources: Sequence[Source], chance: Chance) -> Sequence[Source]:
     s = chance.choose(np.stack([share * (columns != NOWHERE) for columns, share in sources]))
     chosen = pick([columns for columns, _ in sources], s)
     return [(chosen, np.ones(len(chosen)))]
+
+
+Past = tuple[Film, Reservoirs]
+"""The integrals of one part of the previous frame, and its reservoirs, of capped confidence."""
+
+Inputs = Callable[[Film, Reservoirs, Sequence[Past]], list[Input]]
+"""What a part of the current frame resamples, from its new samples, which come first, and its partners' past."""
+
+Following = Callable[[Sequence[int], Array, Array, Chance], Inputs]
+"""How history follows the motion: by the shape of the previous image, `by` (film, n) and columns (N,), for all parts.
+
+`moving` it into the square, or `squares.keeping` what is there.
+"""
+
+
+def moving(overlap: Overlap) -> Following:
+    """Samples move by whole pixels into the square, those of all parts from the same overlapped pixels."""
+
+    def following(shape: Sequence[int], by: Array, index: Array, chance: Chance) -> Inputs:
+        sources = overlap(overlapped(shape, by, index), chance)
+
+        def inputs(of: Film, X: Reservoirs, past: Sequence[Past]) -> list[Input]:
+            history = [
+                shared_by(entering(Y, Pixels(there, columns)), share)
+                for there, Y in ((still(before, by), Y) for before, Y in past)
+                for columns, share in sources
+            ]
+            return [Input(X, Pixels(Displaced(of, by), index)), *history]
+
+        return inputs
+
+    return following
+
+
+MOVED = moving(every)
+"""The loop's usual way, by all overlapped pixels."""
 
 
 def still(of: Film, by: Array) -> Displaced:

@@ -207,6 +207,11 @@ class Pairs:
         of: Any = self.of
         return Paired(of.displaced(x.x, by), x.k, x.offset)
 
+    def place(self, x: Paired) -> Array:
+        """The base path's place in its pixel, for integrals that have one; (film, N)."""
+        of: Any = self.of
+        return np.asarray(of.place(x.x))
+
     def end(self, index: Array, k: Array) -> Pixels:
         """The pixels on side k (N,) of each column's pair."""
         return Pixels(self.of, index // self.n * pixels(self.of) + self.ends[k, index % self.n])

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from restir_ref.area import Displaced, Film, Overlap, every, overlapped, shared_by, still
+from restir_ref.area import MOVED, Film, Following
 from restir_ref.batch import Array, joined, take
 from restir_ref.chance import Chance
 from restir_ref.gradient import MAGNITUDE, SIGNS, Drawn, Pairs, Part
@@ -68,7 +68,7 @@ class Group:
     by      (film, n) where the previous frame showed each, in pixels from where it is; inf where there is no history
     around  how neighbours are chosen
     active  which (n,) reuse in space
-    overlap which of the overlapped previous pixels, or pairs, are asked
+    follow  how history follows the motion
 
     Raises ValueError where these are not of as many pixels or pairs as the integrals.
     """
@@ -78,7 +78,7 @@ class Group:
     by: Array
     around: Around
     active: Array
-    overlap: Overlap = every
+    follow: Following = MOVED
 
     def __post_init__(self) -> None:
         for part, of in self.of.items():
@@ -154,12 +154,10 @@ def in_time(
             f"{tuple(group.shape)}: keep the image's size, or start anew without history."
         )
     index = np.arange(columns_of(X))
-    sources, found = group.overlap(overlapped(before.shape, group.by, index), chance), {}
+    inputs_of, found = group.follow(before.shape, group.by, index, chance), {}
     for part, of in group.of.items():
-        inputs = [Input(X[part], Pixels(Displaced(of, group.by), index))]
-        for partner in partners[part]:
-            there, past = still(before.of[partner], group.by), capped(Y[partner], preset.cap)
-            inputs += [shared_by(entering(past, Pixels(there, columns)), share) for columns, share in sources]
+        past = [(before.of[partner], capped(Y[partner], preset.cap)) for partner in partners[part]]
+        inputs = inputs_of(of, X[part], past)
         found[part] = gris(inputs, inputs[0].at, WEIGHTS[preset.along], chance)
     return found
 

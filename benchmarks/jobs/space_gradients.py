@@ -13,8 +13,8 @@ import numpy as np
 from benchmarks.jobs.comparing import Truth, joined, judged, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from figures.claims.figure import Arrays
-from figures.experiments.following import followed, frugal, views_of
-from figures.experiments.gradients import ADAPTIVE, METHODS
+from figures.experiments.following import followed, frugal, in_place, views_of
+from figures.experiments.gradients import ADAPTIVE, METHODS, with_restir
 from figures.experiments.rendering import POINTS, lattice_tracing
 from figures.experiments.views import HYBRID
 from restir_ref.batch import Array
@@ -27,8 +27,13 @@ from tracer3d.scenes import checker
 SIDE, FRAMES, REPLICAS = 9, 3, 64
 """Rows and columns of the crop, whose 72 differences along rows are eight blocks; frames, and replicas of a chunk."""
 
-CHUNKS: Mapping[str, int] = MappingProxyType({"truth": 32, "with": 96, "after": 128, "path tracing": 112})
-CLAIMS: Mapping[str, str] = MappingProxyType({"with": "GPT-A02", "after": "COM-B07", "path tracing": "COM-B06"})
+IN_PLACE = "with, in place"
+"""Pair reuse whose history stays where it is, instead of one overlapped pixel's that is moved."""
+
+CHUNKS: Mapping[str, int] = MappingProxyType({"truth": 32, "with": 96, IN_PLACE: 96, "after": 128, "path tracing": 112})
+CLAIMS: Mapping[str, str] = MappingProxyType(
+    {"with": "GPT-A02", IN_PLACE: "GPT-A02, GPT-A05", "after": "COM-B07", "path tracing": "COM-B06"}
+)
 EPS = 0.01
 
 
@@ -41,7 +46,8 @@ def compute(params: Params, *, rng: np.random.Generator) -> Arrays:
         return {"dx": np.diff(image.reshape(SIDE, SIDE)).reshape(1, -1)}
     asked = Counter[str]()
     views = views_of(s, followed(s, SIDE, FRAMES), GRADIENT, ADAPTIVE, asked)
-    return {"dx": METHODS[method]([*map(frugal, views)], asked, REPLICAS, Live(rng))["dx"]}
+    history, render = (in_place, with_restir) if method == IN_PLACE else (frugal, METHODS[method])
+    return {"dx": render([*map(history, views)], asked, REPLICAS, Live(rng))["dx"]}
 
 
 def chunks(share: float) -> Sequence[Params]:

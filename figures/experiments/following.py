@@ -8,8 +8,9 @@ import numpy as np
 
 from figures.experiments.gradients import Spatial
 from figures.experiments.pans import paired
-from restir_ref.area import one_by_area
+from restir_ref.area import moving, one_by_area
 from restir_ref.gradient_loop import GradientPreset, View
+from restir_ref.squares import keeping
 from restir_ref.transport.rays import arrive
 from tracer3d.scenes import INSET, Setting
 from tracer3d.sensors import FILM, Pinhole
@@ -42,4 +43,9 @@ def views_of(
 
 def frugal(view: View) -> View:
     """The same with one of the overlapped previous pixels, chosen by its share of the area."""
-    return {name: replace(group, overlap=one_by_area) for name, group in view.items()}
+    return {name: replace(group, follow=moving(one_by_area)) for name, group in view.items()}
+
+
+def in_place(view: View) -> View:
+    """The same with what lies in the square, of all overlapped pixels, kept where it is."""
+    return {name: replace(group, follow=keeping) for name, group in view.items()}

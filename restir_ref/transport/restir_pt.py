@@ -6,7 +6,7 @@ from itertools import islice
 
 import numpy as np
 
-from restir_ref.batch import Array, changed
+from restir_ref.batch import Array, changed, rows
 from restir_ref.chance import Chance
 from restir_ref.integrals import Pixels, Shifted
 from restir_ref.transport.paths import Path, Tracer, Tree, leaves, trace
@@ -71,6 +71,10 @@ class PathIntegrals:
         there: PathIntegrals = to.of  # type: ignore[assignment]
         y, J = shift_path(there.tracer, x, to.index % there.n)
         return Shifted(y, J)
+
+    def place(self, x: Path) -> Array:
+        """The first numbers, which are the place on the film; (film, N)."""
+        return rows(x, "u", slice(self.tracer.sensor.film_numbers))
 
     def displaced(self, x: Path, by: Array) -> Path:
         """The same numbers at another place of the film; not traced yet."""

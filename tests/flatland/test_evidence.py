@@ -438,9 +438,10 @@ def test_differences_with_the_wrong_sign_or_size_turn_those_of_space_red(monkeyp
         ]
         return [row.holds for row in space_gradients.judge(done)]
 
-    assert judged_with("with", 1) == [True, True, True]
-    assert judged_with("with", -1) == [False, True, True]
-    assert judged_with("after", 1.02) == [True, False, True]
+    assert judged_with("with", 1) == [True] * 4
+    assert judged_with("with", -1) == [False, True, True, True]
+    assert judged_with("with, in place", -1) == [True, False, True, True]
+    assert judged_with("after", 1.02) == [True, True, False, True]
 
 
 def test_probes_of_mutations_run_and_their_truth_is_theirs(monkeypatch) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from figures.experiments import gradients
 from figures.experiments.flatland import displaced
+from figures.experiments.following import in_place
 from figures.experiments.gradients import ADAPTIVE, DENSE, MAPS, NONE, gradient_view, sensors_of, with_restir
 from figures.experiments.references import reference
 from figures.experiments.views import HYBRID, setting
@@ -57,6 +58,13 @@ def test_a_displaced_path_returns_to_its_place_with_the_inverse_jacobian() -> No
     assert (y.J * back.J)[whole] == pytest.approx(1, rel=1e-6)
     assert abs(back.x.u[0] - X.x.u[0])[whole].max() < 1e-12
     assert back.x.F[:, whole] == pytest.approx(X.x.F[:, whole], rel=1e-6)
+
+
+def test_the_place_of_a_path_is_where_its_own_ray_meets_the_film() -> None:
+    last, _, X, y, _ = shifted_pair()
+    assert np.array_equal(last.of.place(X.x), X.x.u[:1])
+    of_a_few = take(y.x, np.array([3, 1]))
+    assert np.array_equal(last.of.place(of_a_few), y.x.u[:1, [3, 1]])
 
 
 class Kept(Displaced):
@@ -177,13 +185,14 @@ def test_an_edge_is_a_difference_of_albedo_of_normals_or_of_depth_and_nothing_el
 
 @pytest.mark.claims("GPT-A02", "GPT-A05", "GPT-F02")
 @pytest.mark.claims("GPT-A13", part="the image, to 2%")
-def test_a_camera_that_pans_by_fractions_leaves_image_and_differences_unbiased() -> None:
+@pytest.mark.parametrize("history", [dict, in_place], ids=["moved", "in place"])
+def test_a_camera_that_pans_by_fractions_leaves_image_and_differences_unbiased(history) -> None:
     """Eight frames, 96 pixels of a checker floor with three borders; errors over the mean of |dx|."""
     last = sensors_of("checker row")[-1]
     sensors = [displaced(last, (0.00035 * (k - 7), 0.0)) for k in range(8)]
     asked, views = Counter(), []
     for sensor, before in zip(sensors, [sensors[0], *sensors], strict=False):
-        views.append(gradient_view("checker", (sensor, before), asked, GRADIENT, ADAPTIVE))
+        views.append(history(gradient_view("checker", (sensor, before), asked, GRADIENT, ADAPTIVE)))
     by = views[-1][PRIMAL].by
     assert (abs(by % 1 - 0.5) < 0.45).all()
     found = with_restir(views, asked, 12, Live(np.random.default_rng(4)))
