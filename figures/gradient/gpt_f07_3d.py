@@ -263,7 +263,10 @@ def check(a: Arrays) -> list[Claim]:
     return [*claims, *whole_pixels(a)]
 
 
-ONE_LEAF = "The baseline shifts one leaf of each path tree.  With pair reuse, image and pairs read one tree per pixel."
+BESIDE = (
+    "Path tracing shifts whole trees, and traces once what their leaves share.  With pair reuse, image and pairs read one "
+    "tree per pixel."
+)
 READING = (
     "The paper cites Area ReSTIR for reuse in time, and names none of its options; rejection is one, as we read it, so "
     "that nothing is refuted."
@@ -274,7 +277,7 @@ def judged(id_: str, pair: tuple[Array, Array], limit: float, part: str) -> Clai
     """The first error below `limit` times the other, if replicas are enough to tell."""
     if few(pair[0]):
         return Claim(id_, None, part, reason=few(pair[0]))
-    return Claim(id_, criteria.ratio_below(*pair, limit), part, caveat=ONE_LEAF, reason=READING)
+    return Claim(id_, criteria.ratio_below(*pair, limit), part, caveat=BESIDE, reason=READING)
 
 
 def told(id_: str, pair: tuple[Array, Array], part: str) -> Claim:
