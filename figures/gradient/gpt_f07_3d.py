@@ -264,8 +264,8 @@ def check(a: Arrays) -> list[Claim]:
 
 
 BESIDE = (
-    "Path tracing shifts whole trees, and traces once what their leaves share.  With pair reuse, image and pairs read one "
-    "tree per pixel."
+    "Path tracing shifts whole trees, and traces once what their leaves share.  With pair reuse, image and pairs read "
+    "one tree per pixel."
 )
 READING = (
     "The paper cites Area ReSTIR for reuse in time, and names none of its options; rejection is one, as we read it, so "
