@@ -267,10 +267,22 @@ def test_shifts_from_one_image_to_one_other_are_one_call_and_what_several_would_
     tos = [Pixels(one, np.array(index)) for index in ([3, 4], [5, 6], [7, 8])]
     together = shifted_together(xs, ats, tos)
     assert (one.calls, other.calls) == ([4], [2])
+    shifted_together([block] * 3, [Pixels(other, np.array([2, 1, 0]))] * 3, [Pixels(one, np.arange(3))] * 3)
+    assert other.calls == [2, 9]
     for y, x, at, to in zip(together, xs, ats, tos, strict=True):
         alone = at.of.shift(x, at.index, to)
         assert same(y.x, alone.x)
         assert y.J.tolist() == alone.J.tolist()
+
+
+def test_samples_that_would_have_to_be_copied_together_are_shifted_by_a_call_each():
+    of = Moving([])
+    xs = [plain(wide(*columns)) for columns in ((1, 2), (3,), (3, 1, 2))]
+    ats = [Pixels(of, np.arange(len(x.f))) for x in xs]
+    apiece = shifted_together(xs, ats, ats)
+    assert of.calls == [2, 1, 3]
+    for y, x, at in zip(apiece, xs, ats, strict=True):
+        assert repr(y) == repr(of.shift(x, at.index, at))
 
 
 @dataclass(frozen=True, eq=False)
