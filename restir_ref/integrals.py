@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from restir_ref.batch import Array, Block, columns, joined, part, take, wide
+from restir_ref.batch import Array, columns, joined, part, take, wide
 from restir_ref.chance import Chance
 from restir_ref.guards import aligned, apart, nonnegative, per_column, read_only
 
@@ -172,11 +172,11 @@ def shifted(x: Sample, at: Pixels, to: Pixels) -> Shifted:
 
 
 def shifted_together(xs: Sequence[Sample], ats: Sequence[Pixels], tos: Sequence[Pixels]) -> Sequence[Shifted]:
-    """Every x of its domains `at` shifted to its domains `to`; blocks, from one image to one other, by one call.
+    """Every x of its domains `at` shifted to its domains `to`; from one image to one other by one call.
 
-    Arrays would have to be copied together, and would leave the cache: each is shifted by a call of its own.
+    Samples that are mere numbers cost less to shift than to copy together: each array is shifted by a call of its own.
     """
-    own = [0 if isinstance(x, Block) else 1 + i for i, x in enumerate(xs)]
+    own = [1 + i if isinstance(x, np.ndarray) else 0 for i, x in enumerate(xs)]
     images = [(id(at.of), id(to.of), alone) for at, to, alone in zip(ats, tos, own, strict=True)]
     found: dict[int, Shifted] = {}
     for pair in dict.fromkeys(images):

@@ -275,10 +275,19 @@ def test_shifts_from_one_image_to_one_other_are_one_call_and_what_several_would_
         assert y.J.tolist() == alone.J.tolist()
 
 
-def test_samples_that_would_have_to_be_copied_together_are_shifted_by_a_call_each():
-    of = Moving([])
-    xs = [plain(wide(*columns)) for columns in ((1, 2), (3,), (3, 1, 2))]
-    ats = [Pixels(of, np.arange(len(x.f))) for x in xs]
+@dataclass(frozen=True, eq=False)
+class Sliding(Moving):
+    """The same for samples that are numbers."""
+
+    def shift(self, x, index, to):
+        self.calls.append(len(index))
+        return Shifted(x + 10 * index + 100 * to.index, 1.0 + to.index)
+
+
+def test_mere_numbers_are_shifted_by_a_call_each():
+    of = Sliding([])
+    xs = [np.arange(n) / 4 for n in (2, 1, 3)]
+    ats = [Pixels(of, np.arange(len(x))) for x in xs]
     apiece = shifted_together(xs, ats, ats)
     assert of.calls == [2, 1, 3]
     for y, x, at in zip(apiece, xs, ats, strict=True):
