@@ -126,11 +126,10 @@ class Line:
         """Keep z.  The offset of an undefined shift is moved into the target domain."""
         there: Line = to.of  # type: ignore[assignment]
         i, j = self.pixel(index), there.pixel(to.index)
-        low, high = there.low.take(j), there.high.take(j)
         z = self.chart.to(i, x)
         y = there.chart.back(j, z)
-        defined = (y >= low) & (y < high) & ~self.holes(i, j, z)
-        y = np.where(defined, y, (low + high) / 2)
+        defined = there.covers(j, y) & ~self.holes(i, j, z)
+        y = np.where(defined, y, ((there.low + there.high) / 2).take(j))
         J = np.abs(self.chart.slope(i, x) / there.chart.slope(j, y))
         return Shifted(y, np.where(defined, J, 0.0))
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from restir_ref.batch import Array, entry
+from restir_ref.batch import Array, entry, pick
 from restir_ref.transport import materials as mat
 from restir_ref.transport.paths import Path, Tracer, Tree, connectable
 
@@ -20,7 +20,6 @@ class Stacks:
     r: Array
     lobe: Array
     w: Array
-    weight: Array
     p: Array
 
 
@@ -63,7 +62,7 @@ def record_from(t: Tracer, tree: Tree, leaf: tuple[Array, Array], c: Array, F: A
     out = np.where(through, entry(s.w, inner), entry(lights, k))
     A = entry(s.p, before) * entry(s.cos, c) / entry(s.r, c) ** (t.scene.space.d - 1)
     A = np.where(c > 0, A * np.where(through, entry(s.p, inner), 1), 1)
-    S, p_light = _suffix(t, tree, s, k, nee, c)
+    S, p_light = _suffix(t, tree, k, nee, c)
     return Path(
         u=tree.u,
         k=k,
@@ -91,32 +90,22 @@ def stacks(tree: Tree) -> Stacks:
         _padded(tree.r),
         _padded([each.lobe for each in at]),
         _padded([each.w for each in at]),
-        _padded([each.weight for each in at]),
         _padded([each.p for each in at]),
     )
 
 
-def _suffix(t: Tracer, tree: Tree, s: Stacks, k: Array, nee: Array, c: Array) -> tuple[Array, Array]:
+def _suffix(t: Tracer, tree: Tree, k: Array, nee: Array, c: Array) -> tuple[Array, Array]:
     """S, the product of everything behind `out`, and the light density at x_k.
 
     c < k: weights of x_(c+1) .. and the end with its MIS weight.  c = k: the bare end, whose MIS
     weight depends on the direction arriving at x_c.  c = k + 1: 1, the light is evaluated again.
     """
-    light_end = _padded([leaf.end for leaf, _ in tree.lights])
-    light_bare = _padded([leaf.bare for leaf, _ in tree.lights])
-    hit_end, hit_bare = _padded([leaf.end for leaf in tree.hits]), _padded([leaf.bare for leaf in tree.hits])
-    end = np.where(nee, entry(light_end, k), entry(hit_end, k))
-    bare = np.where(nee, entry(light_bare, k), entry(hit_bare, k))
-    S = np.where(c < k, end, np.where(c == k, bare, 1.0))
+    leaf = pick([*(leaf for leaf, _ in tree.lights), *tree.hits], np.maximum(k, 1) - 1 + np.where(nee, 0, t.depth))
+    S = np.where(c < k, leaf.end, np.where(c == k, leaf.bare, 1.0))
     last = np.where(nee, k - 1, k)
-    for i in range(1, t.depth + 1):
-        S = S * np.where((i > c) & (i <= last), s.weight[i], 1.0)
-    p_light = np.where(
-        nee,
-        entry(_padded([leaf.p_light for leaf, _ in tree.lights]), k),
-        entry(_padded([leaf.p_light for leaf in tree.hits]), k),
-    )
-    return S, p_light
+    for i, at in enumerate(tree.at, start=1):
+        S = S * np.where((i > c) & (i <= last), at.weight, 1.0)
+    return S, leaf.p_light
 
 
 def _padded(parts: Sequence[Array]) -> Array:

@@ -81,19 +81,19 @@ def replay(t: Tracer, x: Path, pixel: Array) -> Prefix:
         columns = np.flatnonzero((s > i) & y.legal)
         if not len(columns):
             break
-        put(y, columns, _step(t, *take((x, y), columns), i))
+        put(y, columns, _step(t, *take((x, y.v, y.T), columns), i))
     return y
 
 
-def _step(t: Tracer, x: Path, y: Prefix, i: int) -> Prefix:
-    """From y_i to y_(i+1), and the test that they must not connect."""
-    at = scatter_by(t, y.v, rows(x, "u", t.scatter_numbers(i)))
-    v, r, met = arrive(t.scene, y.v.x, at.w)
+def _step(t: Tracer, x: Path, v: Vertex, T: Array, i: int) -> Prefix:
+    """From y_i, v with the throughput T, to y_(i+1), and the test that they must not connect."""
+    at = scatter_by(t, v, rows(x, "u", t.scatter_numbers(i)))
+    there, r, met = arrive(t.scene, v.x, at.w)
     by_hit = (x.c == 0) & ~x.nee & (x.k == i)
-    far = np.where(by_hit, 1.0, _roughness_of_y(t, x, v, i + 1)) if i < t.depth else np.ones(len(r))
-    early = connectable(t.rule, mat.lobe_roughness(t.scene.materials, y.v, at.lobe), far, r)
-    T = y.T * at.weight
-    return Prefix(v, r, at.p_all, T, met & ~early & (T.any(axis=0) | by_hit))
+    far = np.where(by_hit, 1.0, _roughness_of_y(t, x, there, i + 1)) if i < t.depth else np.ones(len(r))
+    early = connectable(t.rule, mat.lobe_roughness(t.scene.materials, v, at.lobe), far, r)
+    T = T * at.weight
+    return Prefix(there, r, at.p_all, T, met & ~early & (T.any(axis=0) | by_hit))
 
 
 def _roughness_of_y(t: Tracer, x: Path, v: Vertex, i: int) -> Array:
@@ -113,9 +113,9 @@ def _hit_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
 def _light_end(t: Tracer, x: Path, y: Prefix) -> tuple[Array, Array, Array]:
     """Light sampling from y_k: F, A = 1, and whether it is legal."""
     F, legal = np.zeros_like(y.T), np.flatnonzero(y.legal)
-    base, at = take((x, y), legal)
-    leaf, _ = light_leaf(t, at.v, mat.lobe_shares(t.scene.materials, at.v), t.end_numbers(base))
-    put(F, legal, at.T * leaf.end)
+    base, v, T = take((x, y.v, y.T), legal)
+    leaf, _ = light_leaf(t, v, mat.lobe_shares(t.scene.materials, v), t.end_numbers(base))
+    put(F, legal, T * leaf.end)
     return F, np.ones_like(y.r), y.legal
 
 

@@ -267,6 +267,8 @@ def test_shifts_from_one_image_to_one_other_are_one_call_and_what_several_would_
     tos = [Pixels(one, np.array(index)) for index in ([3, 4], [5, 6], [7, 8])]
     together = shifted_together(xs, ats, tos)
     assert (one.calls, other.calls) == ([4], [2])
+    shifted_together([block] * 3, [Pixels(other, np.array([2, 1, 0]))] * 3, [Pixels(one, np.arange(3))] * 3)
+    assert other.calls == [2, 9]
     for y, x, at, to in zip(together, xs, ats, tos, strict=True):
         alone = at.of.shift(x, at.index, to)
         assert same(y.x, alone.x)
