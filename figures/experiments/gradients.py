@@ -38,7 +38,9 @@ from restir_ref.images import alike_among, random_in_disk
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import Around, random_in_row
 from restir_ref.restir import initial, shade
+from restir_ref.transport.baselines.gradient_path_tracing import difference, grown, radiance_of
 from restir_ref.transport.counting import counted, rays
+from restir_ref.transport.distinct import distinct
 from restir_ref.transport.edges import TRIES, edges, like_pairs, seen
 from restir_ref.transport.paths import Sensor, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals, ScatteredIntegrals
@@ -168,6 +170,20 @@ def path_traced(views: Sequence[View], asked: Counter[str], replicas: int, chanc
     return differences(view, X, replicas) | {"rays": np.array(rays(asked) / (replicas * view[PRIMAL].n))}
 
 
+def whole_trees(views: Sequence[View], asked: Counter[str], replicas: int, chance: Chance) -> Arrays:
+    """Gradient-domain path tracing that shifts all leaves of its trees, and traces once what they share.  [KMA15]"""
+    view = views[-1]
+    n, image = view[PRIMAL].n, view[PRIMAL].of[PRIMAL]
+    assert isinstance(image, PathIntegrals)
+    seen_once = replace(image, tracer=replace(image.tracer, scene=distinct(image.tracer.scene)))
+    trees = grown(seen_once, np.arange(replicas * n), chance)
+    found = {PRIMAL: grey(radiance_of(trees), replicas)}
+    for name, (ends, _) in forward(view[PRIMAL].shape).items():
+        i, j = ((np.arange(replicas)[:, None] * n + end).ravel() for end in ends)
+        found[name] = grey(difference(trees, Pixels(seen_once, i), Pixels(seen_once, j)), replicas)
+    return found | {"rays": np.array(rays(asked) / (replicas * n))}
+
+
 def differences(view: View, X: Reservoirs, replicas: int) -> Arrays:
     """The image and its differences from its own samples; (replicas, n) each."""
     image, n = view[PRIMAL].of[PRIMAL], view[PRIMAL].n
@@ -192,7 +208,7 @@ def temporal_only(views: Sequence[View], asked: Counter[str], replicas: int, cha
 Method = Callable[[Sequence[View], Counter[str], int, Chance], Arrays]
 
 METHODS: Mapping[str, Method] = MappingProxyType(
-    {"with": with_restir, "after": after_restir, "path tracing": path_traced}
+    {"with": with_restir, "after": after_restir, "path tracing": whole_trees}
 )
 
 

@@ -1,8 +1,7 @@
-"""Golden vectors of probe queries: a volume, questions, and all that an answer is made of, for shaders.
+"""Golden vectors of caches: volumes, questions, and all that an answer is made of; and footprints; for shaders.
 
 Numbers are the same in float32.  Every choice of a query (the cell, the texels between which a map is interpolated) is
-far from falling the other way; what depends on them is continuous.  Tolerances are OPERATIONS times what moving all
-inputs by one rounding of float32 does.
+far from falling the other way; what depends on them is continuous.
 """
 
 import argparse
@@ -16,24 +15,20 @@ from typing import Any
 import numpy as np
 
 from restir_ref.batch import Array, take
+from restir_ref.transport.cache import golden_footprints
+from restir_ref.transport.cache.golden_numbers import PATTERNS, lattice, nudged, single, tolerances
 from restir_ref.transport.cache.grid import Grid
 from restir_ref.transport.cache.maps import Maps
 from restir_ref.transport.cache.volume import Volume
 from restir_ref.transport.vectors import normalize
 
-FORMAT, VERSION = "restir-ref golden probes", 1
+FORMAT, VERSION = "restir-ref golden probes", 2
 
 MARGIN = 1 / 256
 """Least distance from another cell, in cells, and least weight of a texel between which a map is interpolated."""
 
 POOL, KEPT = 512, 24
 """Questions, of which a file keeps those beyond doubt."""
-
-OPERATIONS = 128
-"""So many roundings are allowed for."""
-
-UNIT = 2.0**-24
-"""Relative error of one operation in float32."""
 
 
 @dataclass(frozen=True)
@@ -44,17 +39,6 @@ class Question:
     n: Array
     w: Array
     b: Array
-
-
-def lattice(rows: int, N: int, first: int) -> Array:
-    """Numbers (rows, N) in [0, 1) that fill their cube evenly, multiples of 2^-16; other rows for another `first`."""
-    steps = np.sqrt(np.array([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0])[first : first + rows])[:, None]
-    return np.asarray(np.floor(np.arange(1, N + 1) * steps % 1 * 2**16) / 2**16)
-
-
-def single(values: Array) -> Array:
-    """As float32 has them."""
-    return np.asarray(values, dtype=np.float32).astype(float)
 
 
 def volume(grid: Grid, maps: Maps, C: int) -> Volume:
@@ -99,31 +83,17 @@ def terms(v: Volume, q: Question) -> dict[str, Array]:
     }
 
 
-def tolerances(v: Volume, q: Question) -> dict[str, float]:
-    """For |got - want| <= tolerance (|want| + mean |want|), by moving every input by one rounding up or down."""
-    want, found = terms(v, q), dict.fromkeys(("near", "trust", "irradiance"), UNIT)
-    for k in range(8):
-        got = terms(*moved(v, q, k))
-        for name in found:
-            size = np.abs(want[name]) + np.abs(want[name]).mean()
-            found[name] = max(found[name], float((np.abs(got[name] - want[name]) / size).max()))
-    return {name: OPERATIONS * each for name, each in found.items()}
-
-
 def moved(v: Volume, q: Question, k: int) -> tuple[Volume, Question]:
-    """Everything times 1 + UNIT or 1 - UNIT, by patterns that differ with k."""
-
-    def by(values: Array, salt: int) -> Array:
-        sign = np.where(np.arange(values.size) * (2 * k + 1 + salt) % 7 < 3, 1.0, -1.0)
-        return np.asarray(values * (1 + UNIT * sign.reshape(values.shape)))
-
-    moved_q = Question(by(q.x, 0), by(q.n, 1), by(q.w, 2), by(q.b, 3))
-    return replace(v, E=by(v.E, 4), r=by(v.r, 5)), moved_q
+    """Every number moved by one rounding."""
+    x, n, w, b = (nudged(each, k, salt) for salt, each in enumerate((q.x, q.n, q.w, q.b)))
+    return replace(v, E=nudged(v.E, k, 4), r=nudged(v.r, k, 5)), Question(x, n, w, b)
 
 
 def vectors(volumes: Mapping[str, Volume]) -> dict[str, Any]:
     """What a file holds."""
-    return {"format": FORMAT, "version": VERSION, "volumes": [vector(name, v) for name, v in volumes.items()]}
+    (d,) = {v.grid.d for v in volumes.values()}
+    answers = [vector(name, v) for name, v in volumes.items()]
+    return {"format": FORMAT, "version": VERSION, "volumes": answers, "footprints": golden_footprints.vector(d)}
 
 
 def vector(name: str, v: Volume) -> dict[str, Any]:
@@ -133,14 +103,16 @@ def vector(name: str, v: Volume) -> dict[str, Any]:
     state = {"reach": v.grid.reach, "E": v.E, "r": v.r, "active": v.active.astype(int)}
     inputs = {each: getattr(q, each) for each in ("x", "n", "w", "b")}
     texels = {"irradiance": v.maps.irradiance.K, "depth": v.maps.depth.K}
+    want = terms(v, q)
+    inexact = {each: want[each] for each in ("near", "trust", "irradiance")}
     return {
         "name": name,
         "grid": grid,
         "texels": texels,
         "volume": state,
         "inputs": inputs,
-        "expected": terms(v, q),
-        "tolerance": tolerances(v, q),
+        "expected": want,
+        "tolerance": tolerances(inexact, (terms(*moved(v, q, k)) for k in PATTERNS)),
     }
 
 

@@ -15,12 +15,12 @@ from restir_ref.guards import whole
 from restir_ref.transport.cache.biases import self_shadow
 from restir_ref.transport.cache.field import Field
 from restir_ref.transport.cache.grid import Grid
+from restir_ref.transport.cache.leaving import diffuse_albedo
 from restir_ref.transport.cache.maps import Directions, fetched, gathering
 from restir_ref.transport.cache.rules import AUGMENTED, Rule, gathered
 from restir_ref.transport.cache.volume import Volume
 from restir_ref.transport.cache.walls import batches, bundle
-from restir_ref.transport.lobes import KINDS
-from restir_ref.transport.materials import Table, Vertex
+from restir_ref.transport.materials import Vertex
 from restir_ref.transport.rays import GRAZING, arrive, emitted, sample_light
 from restir_ref.transport.scene import Scene
 from restir_ref.transport.space import ball_volume
@@ -36,15 +36,9 @@ Leaving = Callable[[Scene, Field, Vertex, Array, Chance], Array]
 """
 
 
-def diffuse_albedo(t: Table) -> Array:
-    """rho, the colours of each material's Lambert lobes together, (C, M)."""
-    lambert = t.colour * (t.kind == KINDS.index("lambert"))
-    return np.asarray(lambert.reshape(len(t.colour), -1, t.L).sum(axis=-1))
-
-
 def diffuse(s: Scene, field: Field, v: Vertex, r: Array, chance: Chance) -> Array:
     """rho / C_d E+(x, n), the diffuse term alone, with the self-shadow bias; (C, N).  [DDGIR Eq. 4, 6]"""
-    rho = diffuse_albedo(s.materials).take(v.material, axis=-1)
+    rho = diffuse_albedo(s.materials, v)
     b = self_shadow(v.n, s.space.to_world(v.n, v.o), field.spacing)
     return np.asarray(rho / ball_volume(s.space.d) * field.irradiance(v.x, v.n, v.n, b))
 
@@ -61,7 +55,7 @@ def scattered_once(s: Scene, v: Vertex, chance: Chance) -> Array:
     G[facing] = (cos * cos_y / power(r, d - 1)).take(facing) * s.visible(
         v.x.take(facing, axis=-1), light.y.take(facing, axis=-1)
     )
-    rho = diffuse_albedo(s.materials).take(v.material, axis=-1)
+    rho = diffuse_albedo(s.materials, v)
     return np.asarray(rho / ball_volume(d) * light.emission * (G / light.pdf_area))
 
 
