@@ -60,6 +60,13 @@ SKETCHES = (
         [Ball((0.3125, 0.25), 0.125, 2)],
         depth=4,
     ),
+    Sketch(
+        "open",
+        "the glossy room without its right wall, so that paths leave it",
+        [WHITE, MIXED, SHINY],
+        [ROOM[0], ROOM[2], ROOM[3], *LAMPS, *SCREEN],
+        EYES,
+    ),
 )
 
 if __name__ == "__main__":

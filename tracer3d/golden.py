@@ -87,6 +87,13 @@ SKETCHES = (
         [Ball((0.5, 0.625, 0.25), 0.1875, 2)],
         depth=4,
     ),
+    Sketch(
+        "open",
+        "the glossy room without its right wall, so that paths leave it",
+        [WHITE, MIXED, SHINY],
+        [*quad(LOW, 0), *quad(HIGH[::-1], 0), *wall(0, 0), *wall(2, 0), *wall(3, 2), *LAMPS, *SCREEN],
+        EYES,
+    ),
 )
 
 if __name__ == "__main__":

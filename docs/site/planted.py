@@ -38,6 +38,7 @@ from restir_ref.transport.paths import Connectability, Tracer
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.proofs.zoo.bug import TransportBug
 from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
+from restir_ref.transport.proofs.zoo.gradients import GRADIENT_BUGS
 from restir_ref.transport.restir_pt import PathIntegrals, ScatteredIntegrals
 from restir_ref.transport.scene import Scene, scene
 
@@ -364,11 +365,21 @@ def bars(of: Array, place: str = "pixel", cell: str = "cell") -> Figure:
     return picture
 
 
+MODELLED = {**CACHE_BUGS, **GRADIENT_BUGS}
+"""Mistakes on models that are exact."""
+
+PAIRED = ("", "pair of pixels")
+
 AXES = {
+    **{name: PAIRED for name, bug in GRADIENT_BUGS.items() if "edges" in bug.symptom or "outlines" in bug.symptom},
     "constant of the glossy term as printed": ("", "a mirror in flatland (0) and in space (1)"),
     "probes without direct light at the second vertex": ("", "place"),
     "no residual beside bounded geometry": ("", "point of the wall, from the crease upwards"),
     "shading with the kept value": ("channel", "pixel"),
+    "probability of the side left out": PAIRED,
+    "difference from one pixel's samples": ("", "the difference (0) and its negative (1)"),
+    "differences of hue in no part": ("channel", "pair of pixels"),
+    "normals that agree mark an edge": ("", "pair of pixels; 2, 4 and 6 are edges"),
 }
 """What places and cells are, where they are no pixels and cells."""
 
@@ -390,8 +401,8 @@ def picture_of(name: str) -> tuple[Figure, str]:
     """A mistake's picture, and its kind: "planted" or "exact"."""
     if name in OTHERS:
         return OTHERS[name](), "planted"
-    if name in CACHE_BUGS:
-        return bars(CACHE_BUGS[name].wrong(), *AXES.get(name, ("pixel", "cell"))), "exact"
+    if name in MODELLED:
+        return bars(MODELLED[name].wrong(), *AXES.get(name, ("pixel", "cell"))), "exact"
     if name in TRANSPORT_BUGS:
         return beside(*both_of(TRANSPORT_BUGS[name])), "planted"
     bug = {**BUGS, **INEFFICIENT}[name]
@@ -408,7 +419,7 @@ def main() -> None:
     parser.add_argument("words", nargs="*", help="parts of names; none for all")
     words = parser.parse_args().words
     FOLDER.mkdir(exist_ok=True)
-    for name in (*OTHERS, *BUGS, *INEFFICIENT, *TRANSPORT_BUGS, *CACHE_BUGS):
+    for name in (*OTHERS, *BUGS, *INEFFICIENT, *TRANSPORT_BUGS, *MODELLED):
         if words and not any(word in name for word in words):
             continue
         with style.context():

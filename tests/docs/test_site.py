@@ -13,6 +13,7 @@ from restir_ref.oracle.zoo import BUGS, INEFFICIENT
 from restir_ref.oracle.zoo.page import NOT_IN_THE_ZOO
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
+from restir_ref.transport.proofs.zoo.gradients import GRADIENT_BUGS
 from tests.checkout import ROOT, plant
 
 BUILT = ROOT / "out-docs" / "html"
@@ -163,7 +164,7 @@ def test_the_worst_z_is_of_rows_that_ask_for_a_small_one() -> None:
 
 # ---------------------------------------------------------------- symptoms
 
-MISTAKES = (*NOT_IN_THE_ZOO, *BUGS, *INEFFICIENT, *TRANSPORT_BUGS, *CACHE_BUGS)
+MISTAKES = (*NOT_IN_THE_ZOO, *BUGS, *INEFFICIENT, *TRANSPORT_BUGS, *CACHE_BUGS, *GRADIENT_BUGS)
 
 
 def test_every_mistake_of_the_zoo_has_a_small_picture_on_the_page_of_symptoms() -> None:

@@ -1,6 +1,6 @@
 """Area reservoirs and gradient frames, exactly: cells that have a place on the film.  [GPT 4.3.1, Fig. 2b]"""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,54 +28,22 @@ from restir_ref.gradient_loop import (
 )
 from restir_ref.integrals import NOWHERE, Pixels, Shifted
 from restir_ref.loop import Preset
-from restir_ref.oracle.cells import Frame, cells
+from restir_ref.oracle.cells import Frame
+from restir_ref.oracle.film import (
+    CELLS,
+    HALVES,
+    RING,
+    SUFFIXES,
+    Coloured,
+    film_scene,
+    grey_but_for_hue,
+    light_of,
+    tinted,
+)
 from restir_ref.oracle.laws import bias_of, expected_sum
 from restir_ref.oracle.scenes import Scene, offset
 from restir_ref.restir import initial, resample, spatial
 from tests.oracle.pairs import labelled, largest_bias
-
-A, S = 2, 2
-K = A * S
-RING = np.array([[1, 0], [0, 1]])  # as many pairs as pixels, which enumeration asks for
-
-
-@dataclass(frozen=True, eq=False)
-class FilmFrame(Frame):
-    """Cell x = a S + s: the a-th of A equal places on the film, suffix s; x + K (a' + 1) is displaced to a'."""
-
-    labels: Array = None
-    """(I, A, S): shifts keep the label of a suffix; -1 where they are undefined."""
-
-    def displaced(self, x: Array, by: Array) -> Array:
-        return x + K * (1 + (x // S + np.rint(by[0] * A).astype(int)) % A)
-
-    def shift(self, x: Array, index: Array, to: Pixels) -> Shifted:
-        there: FilmFrame = to.of
-        i, j, cell = self.ids(index), there.ids(to.index), x % K
-        a, place = cell // S, np.where(x < K, cell // S, x // K - 1)
-        label = self.labels[i, a, cell % S]
-        y = place * S + (self.labels[j, place] == label[:, None]).argmax(axis=1)
-        stays = (i == j) & (a == place)
-        y = np.where(stays, cell, y)
-        defined = stays | ((label >= 0) & (self.labels[j, place, y % S] == label))
-        return Shifted(y, np.where(defined, self.cells.v[j, y] / self.cells.v[i, cell], 0))
-
-
-def film_scene(seed: int, n: int = 2) -> Scene:
-    """Two frames with holes in their shifts, dark cells, and unequal volumes."""
-    rng = np.random.default_rng(seed)
-    I = 2 * n
-    v, f = rng.uniform(0.3, 2, (I, K)), rng.uniform(0.2, 2, (I, K)) * (rng.random((I, K)) < 0.85)
-    labels = np.argsort(rng.random((I, A, S)), axis=-1)
-    labels = np.where(rng.random(labels.shape) < 0.85, labels, -1)
-    pdf = rng.uniform(0.3, 1, (1, I, K))
-    nowhere = np.full((I, I, K), -1)
-    tables = cells(v, f, pdf / (pdf * v).sum(axis=-1, keepdims=True), nowhere)
-    return Scene([FilmFrame(tables, n, t, labels) for t in range(2)])
-
-
-BY = np.array([[0.5, -0.5]])
-"""Either pixel overlaps both: pixel 0 by halves of 0 and 1, pixel 1 of 0 and 1."""
 
 
 def area_frames(scene: Scene, by: Array, kind=Displaced):
@@ -99,7 +67,7 @@ each_seed = pytest.mark.parametrize("seed", range(6))
 @each_seed
 def test_area_reservoirs_are_unbiased_in_every_cell(seed) -> None:
     scene = film_scene(seed)
-    assert abs(bias_of(area_frames(scene, BY), scene.v, scene.support)).max() < 1e-13
+    assert abs(bias_of(area_frames(scene, HALVES), scene.v, scene.support)).max() < 1e-13
 
 
 class Ignored(Displaced):
@@ -116,13 +84,13 @@ class Jittered(Displaced):
 
     def shift(self, x, index, to):
         y = Displaced.shift(self, x, index, to)
-        return y if self.by.any() else Shifted(y.x % S, y.J)
+        return y if self.by.any() else Shifted(y.x % SUFFIXES, y.J)
 
 
 @pytest.mark.claims("GPT-A05")
 @pytest.mark.parametrize("kind", [Ignored, Jittered])
 def test_a_square_that_is_ignored_one_way_and_a_place_drawn_anew_are_noticed(kind) -> None:
-    bias = [abs(bias_of(area_frames(s, BY, kind), s.v, s.support)).max() for s in map(film_scene, range(3))]
+    bias = [abs(bias_of(area_frames(s, HALVES, kind), s.v, s.support)).max() for s in map(film_scene, range(3))]
     assert max(bias) > 0.02
 
 
@@ -132,8 +100,8 @@ def chosen_frames(scene: Scene, choice):
 
     def loop(index, chance):
         history = initial(Pixels(before, index), chance)
-        here, there = Pixels(Displaced(now, BY), index), still(before, BY)
-        sources = choice(overlapped((before.n,), BY, index), chance, history)
+        here, there = Pixels(Displaced(now, HALVES), index), still(before, HALVES)
+        sources = choice(overlapped((before.n,), HALVES, index), chance, history)
         at = [(Pixels(there, columns), share) for columns, share in sources]
         return area_temporal(initial(Pixels(now, index), chance), here, history, at, chance)
 
@@ -227,8 +195,8 @@ def test_a_displacement_of_another_number_of_axes_is_refused() -> None:
 
 def test_there_and_back_is_the_same_place() -> None:
     before, now = film_scene(0).frames
-    here, there = Displaced(now, BY), still(before, BY)
-    index, x = np.repeat([0, 1], K), np.tile(np.arange(K), 2)
+    here, there = Displaced(now, HALVES), still(before, HALVES)
+    index, x = np.repeat([0, 1], CELLS), np.tile(np.arange(CELLS), 2)
     y = there.shift(x, index, Pixels(here, index))
     back = here.shift(y.x, index, Pixels(there, index))
     assert (y.J > 0).any()
@@ -238,13 +206,13 @@ def test_there_and_back_is_the_same_place() -> None:
 
 def test_all_of_a_displaced_image_but_its_shifts_is_that_of_the_image() -> None:
     frame = film_scene(0).now
-    here, index, x = Displaced(frame, BY), np.repeat([0, 1], K), np.tile(np.arange(K), 2)
+    here, index, x = Displaced(frame, HALVES), np.repeat([0, 1], CELLS), np.tile(np.arange(CELLS), 2)
     assert here.n == frame.n
     (own,), (drawn,) = (list(of.candidates(index, Live(np.random.default_rng(1)))) for of in (frame, here))
     assert np.array_equal(own, drawn)
     assert np.array_equal(here.target(index, x), frame.target(index, x))
     assert np.array_equal(here.contribution(index, x), frame.contribution(index, x))
-    assert len(np.unique(frame.contribution(index, x))) > K
+    assert len(np.unique(frame.contribution(index, x))) > CELLS
 
 
 # ---------------------------------------------------------------- gradient frames
@@ -257,7 +225,7 @@ def ring(of, index, count, radius, chance):
 PRESET = GradientPreset(Preset(1, 1, 1, 1, 3.0), Preset(1, 1, 1, 1, 3.0))
 
 
-def group(of: dict, by: Array = BY) -> Group:
+def group(of: dict, by: Array = HALVES) -> Group:
     return Group(of, (2,), by, ring, np.ones(2, dtype=bool))
 
 
@@ -274,7 +242,7 @@ def pair_frames(scene: Scene, *parts: str, partners=SAME_SIGN):
         Y = first(before, index, sampled(scene.frames[0], chance, 1, at), chance)
         X = first(now, index, sampled(scene.now, chance, 1, at), chance)
         X = in_time(now, X, (before, Y), PRESET.pairs, partners, chance)
-        return labelled(in_space(now, X, PRESET.pairs, partners, chance)[parts[0]], K)
+        return labelled(in_space(now, X, PRESET.pairs, partners, chance)[parts[0]], CELLS)
 
     return loop
 
@@ -316,30 +284,6 @@ def test_pairs_with_one_reservoir_for_both_signs_are_unbiased_over_two_frames() 
 # ---------------------------------------------------------------- colour
 
 
-@dataclass(frozen=True, eq=False)
-class Coloured(FilmFrame):
-    """The same brightness in three channels, tinted by place and pixel."""
-
-    tint: Array = None
-    """(3, I, K), with mean 1."""
-
-    def contribution(self, index: Array, x: Array) -> Array:
-        return self.target(index, x) * self.tint[:, self.ids(index), x]
-
-
-def tinted(frame: FilmFrame) -> Coloured:
-    hues = np.tile([0.5, 1.0, 1.5], (*frame.cells.f.shape, 1))  # whose mean is 1 without rounding
-    tint = np.random.default_rng(9).permuted(hues, axis=-1)
-    return Coloured(frame.cells, frame.n, frame.t, frame.labels, np.moveaxis(tint, -1, 0))
-
-
-def grey_but_for_hue(scene: Scene) -> Coloured:
-    """Equally bright everywhere, so that no difference of any two paths has a mean."""
-    one, labels = np.ones((2 * scene.now.n, K)), np.tile(np.arange(S), (2 * scene.now.n, A, 1))
-    tables = cells(one, one, one[None] / K, scene.now.cells.shifts)
-    return tinted(FilmFrame(tables, scene.now.n, 1, labels))
-
-
 def coloured_bias(frame: Coloured) -> Array:
     """Of both signs after spatial reuse, (3, pairs), over the sum of all light."""
     at = pair_group(frame, *SIGNS)
@@ -348,7 +292,7 @@ def coloured_bias(frame: Coloured) -> Array:
         X = first(at, index, sampled(frame, chance, 1, len(index) // 2), chance)
         return shaded(at, in_space(at, X, PRESET.pairs, SAME_SIGN, chance))
 
-    light = (frame.cells.f * frame.cells.v * frame.tint)[:, frame.ids(np.arange(2))].sum(axis=-1)
+    light = light_of(frame)
     return (expected_sum(estimate, 2) - (light[:, RING[0]] - light[:, RING[1]])) / light.sum()
 
 
@@ -386,7 +330,7 @@ def test_groups_of_unequal_sizes_are_refused() -> None:
     with pytest.raises(ValueError, match="`by` has 3 columns, `active` 2"):
         group({"primal": frame}, np.zeros((1, 3)))
     with pytest.raises(ValueError, match=r"its shape is \(3,\)"):
-        Group({"primal": frame}, (3,), BY, ring, np.ones(2, dtype=bool))
+        Group({"primal": frame}, (3,), HALVES, ring, np.ones(2, dtype=bool))
 
 
 def test_history_of_another_size_is_refused() -> None:
@@ -429,16 +373,16 @@ def test_overlapped_pixels_bring_their_shares_of_a_capped_confidence() -> None:
     preset, partners = Preset(1, 0, 1, 1, 2.0), {"primal": ("primal",)}
     found = in_time(group({"primal": now}), X, (group({"primal": before}), Y), preset, partners, chance)["primal"]
     assert found.c.tolist() == [3.0, 3.0]
-    third = in_time(group({"primal": now}, BY / 2), X, (group({"primal": before}), Y), preset, partners, chance)[
+    third = in_time(group({"primal": now}, HALVES / 2), X, (group({"primal": before}), Y), preset, partners, chance)[
         "primal"
     ]
     assert third.c.tolist() == [3.0, 3.0]
-    edge = in_time(group({"primal": now}, -BY / 2), X, (group({"primal": before}), Y), preset, partners, chance)
+    edge = in_time(group({"primal": now}, -HALVES / 2), X, (group({"primal": before}), Y), preset, partners, chance)
     assert edge["primal"].c.tolist() == [2.5, 2.5]  # a quarter of either square lies outside of the row
 
 
 @pytest.mark.claims("GPT-A05", part="confidences of the overlapped pixels")
-@pytest.mark.parametrize(("by", "found"), [(BY, 3.0), (BY / 2, 3.0), (-BY / 2, 2.5)])
+@pytest.mark.parametrize(("by", "found"), [(HALVES, 3.0), (HALVES / 2, 3.0), (-HALVES / 2, 2.5)])
 def test_area_reservoirs_have_the_confidence_of_the_area_that_the_previous_frame_showed(by, found) -> None:
     before, now = film_scene(1).frames
     index, chance = np.arange(2), Live(np.random.default_rng(1))

@@ -26,7 +26,8 @@ from restir_ref.gradient_loop import (
     step,
 )
 from restir_ref.loop import Preset
-from tests.oracle.test_area import film_scene, ring
+from restir_ref.oracle.film import film_scene
+from tests.oracle.test_area import ring
 
 N = 4
 RING = np.stack([(np.arange(N) + 1) % N, np.arange(N)])

@@ -11,7 +11,8 @@ from restir_ref.oracle.zoo.page import BEFORE, SECTIONS, Entry, pieces
 from restir_ref.transport.proofs.zoo import TRANSPORT_BUGS
 from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
 from restir_ref.transport.proofs.zoo.cures import PATH_CURES
-from restir_ref.transport.proofs.zoo.page import cached, section
+from restir_ref.transport.proofs.zoo.gradients import GRADIENT_BUGS
+from restir_ref.transport.proofs.zoo.page import cached, differences, section
 from tests.checkout import ROOT
 from tests.oracle.pinned import ALL, looked_up
 
@@ -41,9 +42,10 @@ def test_poor_words_are_noticed(part, words) -> None:
 
 
 def others() -> Iterator[str]:
-    """The parts of the page about paths and caches."""
+    """The parts of the page about paths, caches and differences."""
     yield from section([*TRANSPORT_BUGS.values()])
     yield from cached([*CACHE_BUGS.values()])
+    yield from differences([*GRADIENT_BUGS.values()])
 
 
 def test_the_index_of_symptoms_is_up_to_date() -> None:
@@ -70,7 +72,7 @@ def cures_missing(text: str) -> list[str]:
 def test_every_symptom_of_the_page_has_a_cure() -> None:
     text = (ROOT / "docs" / "symptoms.md").read_text(encoding="utf-8")
     assert cures_missing(text) == []
-    assert text.count("| cure |") == len(SECTIONS) + 3
+    assert text.count("| cure |") == len(SECTIONS) + 4
 
 
 @pytest.mark.parametrize(

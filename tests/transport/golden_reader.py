@@ -443,6 +443,30 @@ class Reader:
             return sum(c[j] / C * ours(0, j) for j in range(1, len(c)))
         return c[i] / C * (1 - ours(i, i))
 
+    # Differences
+
+    def parts(self, d: Vector) -> list[tuple[Real, Real, Vector]]:
+        """p_hat, share and contribution of the positive and of the negative part of d."""
+        slack = self.mean(tuple(map(abs, d))) * self.real(0.1) if len(d) > 1 else self.real(0)
+        both = [max(sign * self.mean(d), self.real(0)) + slack for sign in (1, -1)]
+        shares = [x / sum(both) if x else self.real(0) for x in both]
+        return [(x, share, times(share, d)) for x, share in zip(both, shares, strict=True)]
+
+    def omega(self, here: Real, there: Real) -> Real:
+        """w of p_hat of the base path, and of the offset path times J; 0/0 = 0."""
+        return here / (here + there) if here else here
+
+    def signed(self, omega: Real, gap: Vector, side: int) -> Vector:
+        return times(omega if side == 0 else -omega, gap)
+
+    def outer(self, A: Real, A_there: Real, J: Real, J_there: Real) -> Real:
+        """J* of a pair from A of its base path and J of its offset path, here and there."""
+        return A_there / A
+
+    def both(self, positive: Vector, negative: Vector) -> Vector:
+        """The difference, of the estimates of both parts."""
+        return along(positive, 1, negative)
+
     # Mutations
 
     def mutate(self, path: Path, leaf: Leaf) -> tuple[Path, Real]:

@@ -1,7 +1,7 @@
 """What `golden_reader` makes of a scene, as the arrays of a file of golden paths."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 from tests.transport.golden_reader import Leaf, Leaving, Path, Reader, along, times
 
@@ -17,6 +17,8 @@ def terms(reader: Reader, golden: Any) -> Iterator[tuple[str, Any]]:
     for name, row in {"vertices": vertices, "scattering": scattering, "lights": lights}.items():
         yield from columns(f"paths.{name}", [row(reader, path) for path in paths])
     yield from columns("paths.leaves", [contributions(reader, path, ends) for path in paths])
+    dark = zip(given["dark_pixel"], transposed(given["dark_u"]), strict=True)
+    yield from columns("dark", [ended(reader, reader.walk(pixel, reader.vector(u)), ends) for pixel, u in dark])
     base = [(paths[i], Leaf(k, nee)) for i, k, nee in zip(given["path"], given["k"], given["nee"], strict=True)]
     yield from columns("shifts.record", [record(reader, *x) for x in base])
     shifts = [(*x, to) for x, to in zip(base, given["to"], strict=True)]
@@ -27,11 +29,14 @@ def terms(reader: Reader, golden: Any) -> Iterator[tuple[str, Any]]:
         "pass", [resampled(reader, [(*base[i], pixels[i]) for i in inputs], *rest) for inputs, *rest in passes]
     )
     yield from columns("pairs", [pair(reader, *x) for x in shifts])
+    triples = zip(transposed(given["differences"]), transposed(golden["expected"]["differences"]["u"]), strict=True)
+    yield from columns("differences", [reused(reader, [(*base[i], pixels[i]) for i in x], u) for x, u in triples])
     yield from columns("mutations", [mutated(reader, *base[i]) for i in given["mutated"]])
 
 
 def columns(name: str, rows: list[Terms]) -> Iterator[tuple[str, Any]]:
-    return ((f"{name}.{key}", last([row[key] for row in rows])) for key in rows[0])
+    """Rows' fields as columns; none of no rows."""
+    return ((f"{name}.{key}", last([row[key] for row in rows])) for key in (rows[0] if rows else ()))
 
 
 def transposed(rows: Any) -> Any:
@@ -106,10 +111,93 @@ def shifted(reader: Reader, path: Path, leaf: Leaf, to: int) -> Terms:
 
 def pair(reader: Reader, path: Path, leaf: Leaf, to: int) -> Terms:
     F, there = reader.F(path, leaf), shifted(reader, path, leaf, to)
-    here = reader.mean(F)
+    omega = reader.omega(reader.mean(F), reader.mean(there["F"]) * there["J"])
+    gap = along(F, -there["J"], there["F"])
+    p_hat, share, contribution = zip(*reader.parts(reader.signed(omega, gap, 0)), strict=True)
+    return {"omega": omega, "gap": gap, "p_hat": p_hat, "share": share, "contribution": contribution}
+
+
+def ended(reader: Reader, path: Path, ends: list[Leaf]) -> Terms:
+    """A path that goes dark."""
+    beyond = reader.depth + 1 - len(path)
     return {
-        "omega": here / (here + reader.mean(there["F"]) * there["J"]),
-        "gap": along(F, -there["J"], there["F"]),
+        "vertices": len(path),
+        "x": [v.x for v in path] + [(reader.real(0),) * reader.d] * beyond,
+        "T": [v.T for v in path] + [reader.black] * beyond,
+        "F": [reader.F(path, leaf) for leaf in ends],
+    }
+
+
+ENDS, BASES, SIDES, CONFIDENCES = ((0, 1), (2, 0), (2, 1)), (0, 2, 1), (0, 0, 1), (1, 4, 2)
+
+
+class Difference(NamedTuple):
+    """A base path in a pair: A of it, J of its offset path, omega, omega gap with its sign; and its parts' p_hat."""
+
+    A: Any
+    J: Any
+    omega: Any
+    signed: Any
+    parts: Any
+
+
+def difference(reader: Reader, path: Path, leaf: Leaf, base: int, offset: int, side: int) -> Difference | None:
+    """The path's own numbers in pixel `base`, and in `offset` beside it; None where it is not defined in `base`."""
+    here, there = shifted(reader, path, leaf, base), shifted(reader, path, leaf, offset)
+    if not here["defined"]:
+        return None
+    J = there["A"] / here["A"]
+    omega = reader.omega(reader.mean(here["F"]), reader.mean(there["F"]) * J)
+    d = reader.signed(omega, along(here["F"], -J, there["F"]), side)
+    return Difference(here["A"], J, omega, d, reader.parts(d))
+
+
+def reused(reader: Reader, three: Any, u: Any) -> Terms:
+    """A pass of pairs of three pixels into the first one, for both signs."""
+    zero, pixel, c = reader.real(0), [p for *_, p in three], reader.vector(CONFIDENCES)
+    seen = []  # input i's base path in the pair of input j
+    for i, side in zip(BASES, SIDES, strict=True):
+        ends = [(pixel[pair[side]], pixel[pair[1 - side]]) for pair in ENDS]
+        seen.append([difference(reader, *three[i][:2], *each, side) for each in ends])
+    own = [seen[i][i] for i in range(3)]
+    landed = [row[0] for row in seen]
+    J = [reader.outer(x.A, y.A, x.J, y.J) if y else zero for x, y in zip(own, landed, strict=True)]
+    signs = [sign_of(reader, seen, J, sign, c, reader.real(u[sign])) for sign in (0, 1)]
+    found = {name: [each[name] for each in signs] for name in signs[0]}
+    return {
+        "c": c,
+        "J": J,
+        "J_offset": [y.J if y else zero for y in landed],
+        "omega": [y.omega if y else zero for y in landed],
+        "signed": [y.signed if y else reader.black for y in landed],
+        **found,
+        "difference": reader.both(*found["estimate"]),
+    }
+
+
+def sign_of(reader: Reader, seen: Any, J: Any, sign: int, c: Any, u: Any) -> Terms:
+    zero = reader.real(0)
+    own = [seen[i][i].parts[sign][0] for i in range(3)]
+    W = [reader.real((i + 1) / 4) if x else zero for i, x in enumerate(own)]
+    p_hat = [row[0].parts[sign][0] if row[0] else zero for row in seen]
+    whole = [
+        [x.parts[sign][0] * x.A / row[0].A if x and row[0] else zero for x in row] for row in seen
+    ]  # p_hat of y_i in pair j, times the J of the way from the first pair to j
+    w = [reader.m(i, p_hat, whole, c) * p_hat[i] * W[i] * J[i] if p_hat[i] else zero for i in range(3)]
+    s = reader.choose(reader.shares(w), u) if sum(w) else 0
+    W_Y = sum(w) / p_hat[s] if sum(w) else zero
+    f = seen[s][0].parts[sign][2] if W_Y else reader.black
+    return {
+        "W": W,
+        "p_hat_own": own,
+        "p_hat": p_hat,
+        "p_hat_from": whole,
+        "u": u,
+        "w": w,
+        "w_sum": sum(w),
+        "s": s,
+        "W_Y": W_Y,
+        "estimate": times(W_Y, f),
     }
 
 

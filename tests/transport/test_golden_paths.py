@@ -14,9 +14,9 @@ import flatland2d.golden as plane
 import tracer3d.golden as solid
 from flatland2d.space import PLANE
 from restir_ref.transport.paths import trace
-from restir_ref.transport.proofs.golden import header, make, margins
+from restir_ref.transport.proofs.golden import differences, header, make, margins
 from restir_ref.transport.proofs.golden.sketch import not_float32
-from restir_ref.transport.proofs.golden.terms import Chosen, first_points, numbers
+from restir_ref.transport.proofs.golden.terms import Chosen, first_points, numbers, records
 from tracer3d.space import SOLID
 
 WORLDS = {"plane": (plane, PLANE), "space": (solid, SOLID)}
@@ -45,6 +45,14 @@ def test_a_file_with_one_other_number_is_stale(tmp_path):
     assert make.stale(tmp_path / "golden.json", fresh) == ["glossy.expected.shifts.J"]
 
 
+def chosen_of(scene) -> Chosen:
+    """The inputs of a scene; those without columns are numbers of pixels all the same."""
+    given = {key: np.array(value) for key, value in scene["inputs"].items()}
+    return Chosen(
+        **{key: value if value.size or key == "dark_u" else value.astype(int) for key, value in given.items()}
+    )
+
+
 @each_scene
 def test_all_inputs_are_the_same_in_float32(name, k):
     scene = shipped(WORLDS[name][0])["scenes"][k]
@@ -59,10 +67,31 @@ def test_a_number_that_float32_does_not_have_is_named():
 def test_every_choice_is_far_from_falling_the_other_way(name, k):
     world, space = WORLDS[name]
     t = world.SKETCHES[k].tracer(space)
-    given = {key: np.array(value) for key, value in shipped(world)["scenes"][k]["inputs"].items()}
-    chosen = Chosen(**given)
+    chosen = chosen_of(shipped(world)["scenes"][k])
     assert (make.margin_of_paths(t, chosen.u, chosen.pixel) > make.MARGIN).all()
     assert (make.margin_of_shifts(t, chosen) > make.MARGIN).all()
+    assert (make.margin_of_darkness(t, chosen.dark_u, chosen.dark_pixel) > make.MARGIN).all()
+
+
+@each_scene
+def test_every_difference_is_of_its_sign_beyond_doubt(name, k):
+    world, space = WORLDS[name]
+    t = world.SKETCHES[k].tracer(space)
+    chosen = chosen_of(shipped(world)["scenes"][k])
+    x, own = records(t, chosen), chosen.pixel[chosen.path]
+    assert (differences.margin_of_pairs(t, x, own, chosen.to) > make.MARGIN).all()
+    assert (differences.margin_of_signs(t, x, own, chosen.differences) > make.MARGIN).all()
+
+
+def test_a_difference_of_equal_paths_is_of_no_sign_and_that_of_no_light_cannot_be_wrong():
+    light = np.array([2.0, 2.0, 0.0])
+    assert differences.doubt(np.array([[0.0, -1.0, 0.0]]), light).tolist() == [0.0, 0.5, np.inf]
+
+
+def test_a_path_that_reaches_its_last_vertex_does_not_go_dark():
+    t = plane.SKETCHES[1].tracer(PLANE)
+    given = shipped(plane)["scenes"][1]["inputs"]
+    assert (make.margin_of_darkness(t, np.array(given["u"]), np.array(given["pixel"])) == 0).all()
 
 
 @each_scene
@@ -99,6 +128,55 @@ def test_the_files_hold_shifts_of_every_sort(name, k):
     assert {0, 1} == set(given["nee"])
     assert (np.array(scene["expected"]["mutations"]["T"]) > 0).any()
     assert len(set(scene["expected"]["pass"]["s"])) > 1
+
+
+def by_light(scene) -> np.ndarray:
+    """Which mutations move x_c where light sampling leaves it."""
+    given, c = scene["inputs"], np.array(scene["expected"]["shifts"]["record"]["c"])
+    k, nee = (np.array(given[name]) for name in ("k", "nee"))
+    return ((nee == 1) & (c == k))[given["mutated"]]
+
+
+@each_scene
+def test_the_files_hold_mutations_where_light_sampling_leaves_x_c(name, k):
+    scene = shipped(WORLDS[name][0])["scenes"][k]
+    T, F = (np.array(scene["expected"]["mutations"][term]) for term in ("T", "F"))
+    lit = by_light(scene)
+    assert lit.any()
+    assert (T[lit] == 1).all()
+    assert F[:, lit].any() or name == "plane"
+
+
+def test_some_mutation_moves_x_c_out_of_the_light_and_some_into_nothing():
+    """The first are taken, the second are not."""
+    found = [
+        (by_light(s), s["expected"]["mutations"]) for world, _ in WORLDS.values() for s in shipped(world)["scenes"]
+    ]
+    assert any((lit & (np.array(m["T"]) == 1) & ~np.array(m["F"]).any(axis=0)).any() for lit, m in found)
+    assert any((~lit & (np.array(m["T"]) == 0)).any() for lit, m in found)
+
+
+@pytest.mark.parametrize(("name", "k"), [each for each in SCENES if each[1] > 0], ids=str)
+def test_the_files_hold_paths_that_go_dark_at_several_vertices(name, k):
+    scene = shipped(WORLDS[name][0])["scenes"][k]
+    dark, depth = scene["expected"]["dark"], scene["scene"]["depth"]
+    n = np.array(dark["vertices"])
+    assert len(set(n.tolist())) > 1
+    assert (n <= depth).all()
+    assert not np.array(dark["F"])[2 * depth].any()
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_the_files_hold_differences_of_every_sort(name):
+    """Either sign chosen or null, from every input, with and without offset paths."""
+    found = [scene["expected"]["differences"] for scene in shipped(WORLDS[name][0])["scenes"]]
+    assert {s for each in found for row in each["s"] for s in row} == {0, 1, 2}
+    assert any((np.array(each["J"]) == 0).any() for each in found)
+    assert any(((np.array(each["J"]) > 0) & (np.array(each["J_offset"]) == 0)).any() for each in found)
+    null = [(np.array(each["W_Y"]) == 0).any() for each in found]
+    assert any(null) == (name == "plane")  # in colour both parts have a share of everything
+    for each in found:
+        assert np.array(each["difference"]) == pytest.approx(np.array(each["estimate"]).sum(axis=0))
 
 
 def test_some_shift_is_undefined_in_each_world():
@@ -139,6 +217,8 @@ def test_a_header_holds_the_numbers_of_the_file_in_float32(name, language):
     read = read_header(header.header(file, header.LANGUAGES[language], "G"))
     for scene in file["scenes"]:
         for where, values in numbers({key: scene[key] for key in ("inputs", "expected")}).items():
+            if not values.size:
+                continue  # neither language has empty arrays
             got = read[re.sub(r"\W+", "_", f"golden{file['d']}.{scene['name']}.{where}")]
             np.testing.assert_allclose(got, values.ravel(), rtol=1e-8, atol=0, err_msg=where)
 

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.transport.golden_reader import Reader, across, along, dot, times
+from tests.transport.golden_reader import Reader, Vertex, across, along, dot, times
 from tests.transport.golden_terms import terms
 
 ROOT = Path(__file__).parents[2]
 FILES = [json.loads((ROOT / world / "data" / "golden_paths.json").read_text()) for world in ("flatland2d", "tracer3d")]
 SCENES = {f"{file['d']}d {scene['name']}": (file["d"], scene) for file in FILES for scene in file["scenes"]}
 PRECISION = {"float64": float, "float32": np.float32}
-GIVEN = {"paths.leaves.k", "paths.leaves.nee", "pass.mis", "pass.canonical"}
+GIVEN = {f"{place}.{field}" for place in ("pass", "differences") for field in ("mis", "canonical")}
+GIVEN |= {"paths.leaves.k", "paths.leaves.nee"}
 
 
 def flat(tree, name=""):
@@ -27,7 +28,8 @@ def flat(tree, name=""):
 
 
 def wanted(scene):
-    return {name: want for name, want in flat(scene["expected"]).items() if name not in GIVEN}
+    """The terms of a file that are to be found; what holds no columns needs none."""
+    return {name: want for name, want in flat(scene["expected"]).items() if name not in GIVEN and np.size(want)}
 
 
 def wrong(reader, scene, precision):
@@ -209,6 +211,43 @@ def both_sides(r, primitive, *ray):
     return replace(Reader.arrive(r, primitive, *ray), emission=r.emission[primitive])
 
 
+def below_goes_up(r, l, o, u):
+    """Directions below the surface are turned to its other side."""
+    *t, up = Reader.sample(r, l, o, u)
+    return (*t, abs(up))
+
+
+def a_sky(r, x, w, skip, T, u):
+    """What meets nothing meets something black far away."""
+    far = [Vertex(0, along(x, 9, w), times(-1, w), r.local(times(-1, w), times(-1, w)), r.real(9), r.black, T, u)]
+    return Reader.cast(r, x, w, skip, T, u) or far
+
+
+def joined_to_a_light(r, path, new, leaf, T):
+    """T of light sampling, as if the light point's numbers followed from another place."""
+    c = r.c(path, leaf)
+    before, after = (x[c - 1].light for x in (path, new))
+    return before.p / after.p if leaf.nee and c == leaf.k and after.p else T
+
+
+def dark_is_refused(r, path, new, leaf, T):
+    return T if any(r.F(new, leaf)) else r.real(0)
+
+
+def light_kept(r, path, leaf):
+    """F of light sampling is not evaluated again at the new x_c."""
+    new, T = Reader.mutate(r, path, leaf)
+    if T and leaf.nee and r.c(path, leaf) == leaf.k:
+        new = [*new[:-1], replace(new[-1], light=path[leaf.k - 1].light)]
+    return new, T
+
+
+def by_the_mean_alone(r, d):
+    """A coloured difference belongs to the sign of its mean, all of it."""
+    both = [max(sign * r.mean(d), r.real(0)) for sign in (1, -1)]
+    return [(x, r.real(int(x > 0)), times(r.real(int(x > 0)), d)) for x in both]
+
+
 # A mistake, a scene, and the first term there that it spoils.
 MISTAKES = {
     "tangents turned": (
@@ -244,6 +283,40 @@ MISTAKES = {
     "T left out": (mutation(lambda r, *x: r.real(1)), "3d glossy", "mutations.T"),
     "T upside down": (mutation(lambda r, path, new, leaf, T: 1 / T), "3d glossy", "mutations.T"),
     "T of the vertex before": (mutation(one_vertex_early), "3d glossy", "mutations.T"),
+    "T of light sampling": (mutation(joined_to_a_light), "3d glossy", "mutations.T"),
+    "mutations into shadow refused": (mutation(dark_is_refused), "2d open", "mutations.T"),
+    "light of the old x_c kept": (but(mutate=light_kept), "3d glossy", "mutations.F"),
+    "directions below the surface turned up": (but(sample=below_goes_up), "3d glossy", "dark.vertices"),
+    "a vertex where a ray meets nothing": (but(cast=a_sky), "2d open", "dark.vertices"),
+    "half weights": (but(omega=lambda r, here, there: r.real(0.5)), "2d mirror ball", "pairs.omega"),
+    "weight of the offset path": (
+        but(omega=lambda r, here, there: Reader.omega(r, there, here)),
+        "3d glossy",
+        "pairs.omega",
+    ),
+    "colour by the sign of its mean": (but(parts=by_the_mean_alone), "3d glossy", "pairs.p_hat"),
+    "parts of the other sign": (but(parts=lambda r, d: Reader.parts(r, d)[::-1]), "2d glossy", "pairs.p_hat"),
+    "whole differences in both parts": (
+        but(parts=lambda r, d: [(x, share, d) for x, share, _ in Reader.parts(r, d)]),
+        "2d glossy",
+        "pairs.contribution",
+    ),
+    "no sign for the second pixel's base paths": (
+        but(signed=lambda r, omega, gap, side: times(omega, gap)),
+        "2d glossy",
+        "differences.signed",
+    ),
+    "inner Jacobian in J*": (
+        but(outer=lambda r, A, A_there, J, J_there: A_there / A * (J or 1)),
+        "3d glossy",
+        "differences.J",
+    ),
+    "J* upside down": (but(outer=lambda r, A, A_there, J, J_there: A / A_there), "3d glossy", "differences.J"),
+    "parts subtracted once more": (
+        but(both=lambda r, positive, negative: along(positive, -1, negative)),
+        "3d glossy",
+        "differences.difference",
+    ),
 }
 
 

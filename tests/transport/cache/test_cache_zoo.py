@@ -9,7 +9,7 @@ import pytest
 from restir_ref.transport.proofs.zoo.cached import (
     CACHE_BUGS,
     G_MAX,
-    CacheBug,
+    ModelBug,
     crease,
     in_a_furnace,
     operator,
@@ -25,7 +25,7 @@ def signs(bias: np.ndarray) -> set[str]:
     return {word for word, there in (("dark", bias.min() < -1e-9), ("bright", bias.max() > 1e-9)) if there}
 
 
-def poor_words(bug: CacheBug) -> list[str]:
+def poor_words(bug: ModelBug) -> list[str]:
     """What a bug's description lacks, or says against its own numbers."""
     said = set(re.findall("dark|bright", bug.symptom))
     found = [] if said == signs(bug.wrong()) else [f"says {sorted(said)} of {sorted(signs(bug.wrong()))}"]

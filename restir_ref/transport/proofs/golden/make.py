@@ -13,8 +13,9 @@ import numpy as np
 from restir_ref.audit.make_golden import text as lines
 from restir_ref.batch import Array, entry, take
 from restir_ref.chance import Chance, Live
-from restir_ref.transport.paths import Tracer, leaves, trace
-from restir_ref.transport.proofs.golden import margins
+from restir_ref.transport.paths import Path as LightPath
+from restir_ref.transport.paths import Tracer, Tree, leaves, trace
+from restir_ref.transport.proofs.golden import differences, margins
 from restir_ref.transport.proofs.golden.sketch import Sketch, not_float32
 from restir_ref.transport.proofs.golden.terms import (
     Chosen,
@@ -30,13 +31,13 @@ from restir_ref.transport.shifts import replay, shift_path
 from restir_ref.transport.space import Space
 from restir_ref.transport.vectors import dot
 
-FORMAT, VERSION = "restir-ref golden paths", 1
+FORMAT, VERSION = "restir-ref golden paths", 2
 
 SEED = 20220701
 POOL = 4096
 """Candidates of which a file keeps those far from boundaries."""
 
-PATHS, SHIFTS, PASSES = 12, 32, 12
+PATHS, SHIFTS, PASSES, DARK = 12, 32, 12, 8
 """How many of them it keeps, of each scene."""
 
 MARGIN = 2.0**-8
@@ -90,16 +91,26 @@ def choose(t: Tracer, chance: Chance) -> Chosen:
     """Paths that stay in the scene, shifts of theirs, and passes over three of these, all far from every boundary."""
     u = np.floor(chance.uniform((t.D, POOL)) / GRAIN) * GRAIN
     pixel = np.arange(POOL) % t.sensor.n
+    lost = np.flatnonzero(margin_of_darkness(t, u, pixel) > MARGIN)[:DARK]
+    dark = {"dark_u": u[:, lost], "dark_pixel": pixel[lost]}
     clear = np.flatnonzero(margin_of_paths(t, u, pixel) > MARGIN)
     found = [F.any(axis=0) for _, nee, F in leaves(trace(t, u[:, clear], pixel[clear])) if not nee]
     kept = mixed(clear, np.any(found, axis=0), PATHS)  # half of them meet a light
     u, pixel = u[:, kept], pixel[kept]
     every = every_shift(t, u, pixel)
-    clear = np.flatnonzero(margin_of_shifts(t, every) > MARGIN)
+    signs = differences.margin_of_pairs(t, records(t, every), pixel[every.path], every.to)
+    clear = np.flatnonzero(np.minimum(margin_of_shifts(t, every), signs) > MARGIN)
     spread = clear[np.argsort(clear * 0.618034 % 1, kind="stable")]  # over paths, leaves and pixels
     some = by_turns([spread[sort[spread]] for sort in sorts(t, every)], SHIFTS)
     shifts = every.shifted(some, every.to[some])
-    return replace(shifts, passes=clear_passes(t, shifts), mutated=clear_mutations(t, shifts))
+    passes = clear_passes(t, shifts)
+    return replace(
+        shifts,
+        passes=passes[:, :PASSES],
+        differences=clear_differences(t, shifts, passes),
+        mutated=clear_mutations(t, shifts),
+        **dark,
+    )
 
 
 def mixed(columns: Array, rare: Array, count: int) -> Array:
@@ -109,12 +120,14 @@ def mixed(columns: Array, rare: Array, count: int) -> Array:
 
 
 def sorts(t: Tracer, s: Chosen) -> list[Array]:
-    """Masks of what shifts can be, rare ones first: connected too early (c = 0, c > 0), blocked, onto a light; all."""
+    """Masks of what shifts can be, rare ones first: dark, connected early (c = 0, > 0), blocked, onto a light; all."""
     x = records(t, s)
     _, J = shift_path(t, x, s.to)
-    early = ~replay(t, x, s.to).legal
+    dark = ends_dark(trace(t, s.u[:, s.path], s.to), last_replayed(x))
+    early = ~replay(t, x, s.to).legal & ~dark
     undefined = J == 0
-    return [early & (x.c == 0), early & (x.c > 0), undefined & ~early, ~undefined & (s.nee == 0), ~undefined]
+    blocked = undefined & ~early & ~dark
+    return [dark, early & (x.c == 0), early & (x.c > 0), blocked, ~undefined & (s.nee == 0), ~undefined]
 
 
 def by_turns(lists: Sequence[Array], count: int) -> Array:
@@ -135,7 +148,7 @@ def every_shift(t: Tracer, u: Array, pixel: Array) -> Chosen:
 
 
 def clear_passes(t: Tracer, s: Chosen) -> Array:
-    """Three base paths each, of which every shift into the pixel of another is clear: (3, passes)."""
+    """Three base paths each, of which every shift into the pixel of another is clear: (3, .), mixed."""
     M, n = len(s.to), t.sensor.n
     shift, to = np.divmod(np.arange(M * n), n)
     own = s.pixel[s.path]
@@ -145,21 +158,32 @@ def clear_passes(t: Tracer, s: Chosen) -> Array:
     clear = np.array([margin[triples[i], pixels[j]] > MARGIN for i in range(3) for j in range(3)]).all(axis=0)
     different = (pixels[0] != pixels[1]) & (pixels[0] != pixels[2]) & (pixels[1] != pixels[2])
     found = np.flatnonzero(clear & different)
-    return triples[:, found[np.argsort(found * 0.618034 % 1, kind="stable")][:PASSES]]
+    return np.asarray(triples[:, found[np.argsort(found * 0.618034 % 1, kind="stable")]])
+
+
+def clear_differences(t: Tracer, s: Chosen, passes: Array) -> Array:
+    """PASSES of clear passes whose differences are of their signs beyond doubt: (3, .)."""
+    some = passes[:, : 8 * PASSES]
+    margin = differences.margin_of_signs(t, records(t, s), s.pixel[s.path], some)
+    return np.asarray(some[:, np.flatnonzero(margin > MARGIN)[:PASSES]])
 
 
 def clear_mutations(t: Tracer, s: Chosen) -> Array:
     """Shifts whose base paths' mutations are clear: the new ray, sides, and what joins x_(c+1), (.,)."""
     x, still = moving(t, s)
-    w = turned(t, x, still.at)
-    z, r, met = arrive(t.scene, still.at.v.x, w)
+    w, v = turned(t, x, still.at), still.at.v
+    exists = w.any(axis=0)
+    z, r, met = arrive(t.scene, v.x, np.where(exists, w, v.n))
     rules = abs(r / t.rule.distance - 1) if t.rule.distance > 0 else r
-    margin = margins.least([margins.of_rays(t.scene, still.at.v.x, z.x), rules, abs(dot(still.at.v.n, w)), z.o[-1]])
-    joins = (x.c <= x.k) & ~(x.nee & (x.c == x.k))
-    far = margins.of_connections(t, z, np.where(joins, x.far_z, z.x + w), np.where(joins, x.far_prim, z.prim))
+    margin = margins.least([margins.of_rays(t.scene, v.x, z.x), rules, abs(dot(v.n, w)), z.o[-1]])
     lit = (x.nee > 0) & (x.c == x.k)
-    margin = np.where(joins, np.minimum(margin, far), np.where(lit, 0, margin))
-    return np.asarray(still.columns[(margin > MARGIN) & met])
+    joins = (x.c <= x.k) & ~lit
+    far = margins.of_connections(t, z, np.where(joins, x.far_z, z.x + w), np.where(joins, x.far_prim, z.prim))
+    by_light = margins.of_light(t, z, t.end_numbers(x))
+    after = np.where(joins, far, np.where(lit, by_light, np.inf))
+    past = margins.of_rays(t.scene, v.x, v.x + margins.BEYOND * t.scene.extent * w)
+    margin = np.where(met, np.minimum(margin, after), np.minimum(past, abs(dot(v.n, w))))
+    return np.asarray(still.columns[(margin > MARGIN) & exists])
 
 
 def margin_of_paths(t: Tracer, u: Array, pixel: Array) -> Array:
@@ -170,20 +194,54 @@ def margin_of_paths(t: Tracer, u: Array, pixel: Array) -> Array:
     return np.asarray(np.where(alive, np.minimum(way.min(axis=0), lights.min(axis=0)), 0))
 
 
+def lit(tree: Tree) -> Array:
+    """How many vertices light reaches from the eye, (N,)."""
+    return np.asarray(np.stack([T.any(axis=0) for T in tree.T]).sum(axis=0))
+
+
+def last_replayed(x: LightPath) -> Array:
+    """The number of the last vertex that a shift of x replays, (M,)."""
+    return np.where(x.c > 0, x.c - 1, np.where(x.nee > 0, x.k, x.k + 1))
+
+
+def ends_dark(there: Tree, last: Array) -> Array:
+    """Whether replayed paths go dark before that vertex, (M,)."""
+    return lit(there) < last
+
+
+def margin_of_ends(t: Tracer, tree: Tree, x_0: Array) -> Array:
+    """Least margin of a path that goes dark up to there, light sampling left out, 0 where it does not; (N,)."""
+    way, _ = margins.of_trees(t, tree, x_0)
+    upto, n = np.minimum.accumulate(np.minimum(way, margins.of_pairs(t, tree)), axis=0), lit(tree)
+    dark = np.stack([margins.of_darkness(t, tree, i) for i in range(1, t.depth + 1)])
+    inside = (n > 0) & (n <= t.depth)
+    i = np.clip(n, 1, t.depth) - 1
+    return np.where(inside, np.minimum(entry(upto, i), entry(dark, i)), 0)
+
+
+def margin_of_darkness(t: Tracer, u: Array, pixel: Array) -> Array:
+    """Least margin of a whole tree that goes dark, 0 where it does not; (N,)."""
+    tree, x_0 = trace(t, u, pixel), first_points(t, pixel)
+    _, lights = margins.of_trees(t, tree, x_0)
+    found = entry(np.minimum.accumulate(lights, axis=0), np.minimum(lit(tree), t.depth))
+    return np.minimum(margin_of_ends(t, tree, x_0), found)
+
+
 def margin_of_shifts(t: Tracer, s: Chosen) -> Array:
     """Least margin of what shifts decide: the offset path up to its last replayed vertex, and its connection; (M,)."""
     x = records(t, s)
     there = trace(t, s.u[:, s.path], s.to)
     way, lights = margins.of_trees(t, there, first_points(t, s.to))
-    last = np.where(x.c > 0, x.c - 1, np.where(x.nee > 0, x.k, x.k + 1))
+    last = last_replayed(x)
     upto = np.minimum.accumulate(np.minimum(way, margins.of_pairs(t, there)), axis=0)
     found = [entry(upto, last - 1), np.where(x.nee > 0, entry(lights, np.maximum(x.k, 1)), np.inf)]
     joined = np.full(len(x.c), np.inf)
     for i in range(1, t.depth + 1):
         c = np.flatnonzero(x.c == i + 1)
         joined[c] = margins.of_connections(t, take(there.x[i - 1], c), x.z[:, c], x.prim[c])
-    lit = np.stack([T.any(axis=0) for T in there.T])  # beyond, columns are not the path's own
-    return np.where(entry(lit, last - 1), margins.least([*found, joined]), 0)
+    onto = (x.c == 0) & (x.nee == 0) & (lit(there) == last - 1)  # onto a light: dark, or F = 0, as one likes
+    dark = np.where(onto, 0, margin_of_ends(t, there, first_points(t, s.to)))
+    return np.where(ends_dark(there, last), dark, margins.least([*found, joined]))  # beyond, columns are not their own
 
 
 # ---------------------------------------------------------------- tolerances

@@ -9,12 +9,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from restir_ref.batch import Array
-from restir_ref.transport.materials import Vertex
+from restir_ref.batch import Array, take
+from restir_ref.transport.lobes import visible_normal
+from restir_ref.transport.materials import Vertex, lobe_roughness
 from restir_ref.transport.paths import Tracer, Tree
 from restir_ref.transport.rays import normal, sample_light
 from restir_ref.transport.scene import Scene
-from restir_ref.transport.vectors import dot, norm, normalize
+from restir_ref.transport.vectors import dot, norm, normalize, reflect
+
+BEYOND = 4
+"""Extents of a scene that a ray which meets nothing is followed."""
 
 START = 1e-6
 """What is met within this share of a ray is where it starts, or where it ends."""
@@ -75,13 +79,32 @@ def of_trees(t: Tracer, tree: Tree, x_0: Array) -> tuple[Array, Array]:
         lobe = of_number(at.P, t.lobe_number(tree.u, i))
         there = of_rays(t.scene, v.x, tree.x[i].x)
         way.append(least([lobe, there, abs(dot(v.n, at.w)), tree.x[i].o[-1]]))
-        lights.append(_of_light(t, tree, i))
+        lights.append(of_light(t, v, t.light_numbers(tree.u, i)))
     return np.stack(way), np.stack(lights)
 
 
-def _of_light(t: Tracer, tree: Tree, i: int) -> Array:
-    """Margin of light sampling at x_i: the light chosen, the sides, and what stands between; (N,)."""
-    v, (pick, point) = tree.x[i - 1], t.light_numbers(tree.u, i)
+def of_darkness(t: Tracer, tree: Tree, i: int) -> Array:
+    """Margin of what leaves x_i being dark: its lobe, how far below the surface, or how far past everything; (N,)."""
+    v, at = tree.x[i - 1], tree.at[i - 1]
+    side, as_normal = abs(dot(v.n, at.w)), abs(at.w - v.n).max(axis=0) < START
+    below = np.flatnonzero(~at.weight.any(axis=0) & as_normal)  # such a sample has the normal in its place
+    side[below] = _depth_below(t, *take((v, at.lobe, t.direction_numbers(tree.u, i)), below))
+    past = of_rays(t.scene, v.x, v.x + BEYOND * t.scene.extent * at.w)
+    past = np.where(np.isfinite(t.scene.intersect(v.x, at.w)[0]), 0, past)
+    past[below] = np.inf
+    return least([of_number(at.P, t.lobe_number(tree.u, i)), side, past])
+
+
+def _depth_below(t: Tracer, v: Vertex, lobe: Array, u: Array) -> Array:
+    """|cos| of the mirrored direction that a rough lobe throws away, 0 if it does not; (N,)."""
+    alpha = lobe_roughness(t.scene.materials, v, lobe) ** 2
+    i = reflect(v.o, visible_normal(t.scene.space, np.maximum(alpha, START), v.o, u))
+    return np.asarray(np.maximum(-i[-1], 0))
+
+
+def of_light(t: Tracer, v: Vertex, numbers: tuple[Array, Array]) -> Array:
+    """Margin of light sampling at v by its numbers: the light chosen, the sides, and what stands between; (N,)."""
+    pick, point = numbers
     light = sample_light(t.scene, pick, point)
     w = normalize(light.y - v.x)
     shares = np.diff(t.scene.lights.upto, prepend=0)[:, None] + 0 * pick

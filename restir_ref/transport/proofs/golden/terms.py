@@ -10,25 +10,18 @@ from typing import Any
 import numpy as np
 
 from restir_ref.batch import Array, entry, ratio, take
-from restir_ref.gradient import gap, omega
 from restir_ref.integrals import Pixels, Reservoirs, shifted
 from restir_ref.mis import WEIGHTS
 from restir_ref.resampling import Input, weigh
 from restir_ref.transport import materials as mat
 from restir_ref.transport.mutations import FarPath, Place, Standing, TwoRays, far_record, land
 from restir_ref.transport.paths import Path, Tracer, Tree, leaves, trace
+from restir_ref.transport.proofs.golden import differences
+from restir_ref.transport.proofs.golden.differences import CONFIDENCES, MIS, Terms, middle
 from restir_ref.transport.rays import sample_light
 from restir_ref.transport.record import first_connectable, record
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.shifts import shift_path
-
-Terms = dict[str, Any]
-
-MIS = "pairwise"
-"""The weights of the pass."""
-
-CONFIDENCES = (1.0, 4.0, 2.0)
-"""Of the three inputs of a pass, the canonical one first."""
 
 TURN = 1 / 16
 """A mutation adds this to the first number of a direction, around the circle."""
@@ -38,8 +31,10 @@ TURN = 1 / 16
 class Chosen:
     """What a file is about: u (D, N) and pixel (N,); of shifts, their base path, leaf (k, nee) and where to, (M,).
 
-    passes (3, P)  the shifts whose base paths a pass resamples, the canonical one first
-    mutated (Q,)   the shifts whose base paths are mutated
+    passes (3, P)      the shifts whose base paths a pass resamples, the canonical one first
+    differences (3, R) those of a pass of pairs, in whose three pixels they live
+    mutated (Q,)       the shifts whose base paths are mutated
+    dark_u (D, B), dark_pixel (B,)  paths that go dark
     """
 
     u: Array
@@ -49,7 +44,10 @@ class Chosen:
     nee: Array
     to: Array
     passes: Array = field(default_factory=lambda: np.zeros((3, 0), dtype=int))
+    differences: Array = field(default_factory=lambda: np.zeros((3, 0), dtype=int))
     mutated: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
+    dark_u: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    dark_pixel: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
 
     def shifted(self, which: Array, to: Array) -> "Chosen":
         """The same base paths as those shifts, to other pixels."""
@@ -57,14 +55,16 @@ class Chosen:
 
 
 def terms(t: Tracer, chosen: Chosen) -> Terms:
-    """Everything, by kind: paths, shifts, pass, pairs, mutations."""
+    """Everything, by kind: paths, those that go dark, shifts, pass, pairs, their pass, mutations."""
     tree = trace(t, chosen.u, chosen.pixel)
     base = records(t, chosen)
     return {
         "paths": paths(t, tree),
+        "dark": dark(t, chosen),
         "shifts": shifts(t, base, chosen),
         "pass": one_pass(t, base, chosen),
-        "pairs": pairs(t, base, chosen),
+        "pairs": differences.pairs(t, base, chosen.pixel[chosen.path], chosen.to),
+        "differences": differences.one_pass(t, base, chosen.pixel[chosen.path], chosen.differences),
         "mutations": mutations(t, chosen),
     }
 
@@ -123,6 +123,18 @@ def lights(t: Tracer, tree: Tree) -> Terms:
     arrives = np.stack([leaf.bare.any(axis=0) for leaf, _ in tree.lights])
     density = np.stack([leaf.p_light for leaf, _ in tree.lights])
     return {"y": np.stack(points), "arrives": arrives.astype(int), "p": np.where(arrives, density, 0)}
+
+
+def dark(t: Tracer, chosen: Chosen) -> Terms:
+    """How many vertices light reaches from the eye, these, what arrives there, and every leaf, 0 beyond."""
+    tree = trace(t, chosen.dark_u, chosen.dark_pixel)
+    lit = np.stack([T.any(axis=0) for T in tree.T])
+    return {
+        "vertices": lit.sum(axis=0),
+        "x": np.where(lit[:, None], np.stack([v.x for v in tree.x]), 0),
+        "T": np.where(lit[:, None], np.stack(tree.T), 0),
+        "F": np.stack([F for _, _, F in leaves(tree)]),
+    }
 
 
 # ---------------------------------------------------------------- shifts
@@ -210,24 +222,7 @@ def _from(y: Path, J: Array, here: Pixels, inputs: list[Input]) -> Array:
     return np.stack(rows)
 
 
-def middle(w: Array) -> tuple[Array, Array]:
-    """A number in the middle of the widest option's interval, a multiple of 2^-12, and the option; (N,) each."""
-    whole = w.sum(axis=0)
-    share = ratio(w, whole)
-    s = share.argmax(axis=0)
-    before = entry(np.cumsum(share, axis=0) - share, s)
-    return np.floor((before + entry(share, s) / 2) * 2**12) / 2**12, s
-
-
-# ---------------------------------------------------------------- pairs and mutations
-
-
-def pairs(t: Tracer, x: Path, chosen: Chosen) -> Terms:
-    """Of the pair (pixel, to) with every shift's base path: w_ij and f_i - f_j J.  [GPT Eq. 2, 13]"""
-    of = PathIntegrals(t)
-    base, offset = Pixels(of, chosen.pixel[chosen.path]), Pixels(of, chosen.to)
-    y = shifted(x, base, offset)
-    return {"omega": omega(x, base, y, offset), "gap": gap(x, base, y, offset)}
+# ---------------------------------------------------------------- mutations
 
 
 def mutations(t: Tracer, chosen: Chosen) -> Terms:

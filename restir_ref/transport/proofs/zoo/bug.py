@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from restir_ref.batch import Array
 from restir_ref.integrals import Image
 from restir_ref.transport.paths import Tracer
 
@@ -26,6 +27,26 @@ class TransportBug:
     breaks: str
     wrong: Callable[[Tracer], Image]
     caught_by: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ModelBug:
+    """A named deliberate error on a small model that is exact: how it gets in, what it looks like, what it breaks.
+
+    `right` and `wrong` compute the exact relative bias of the model, (places, cells), without the error and with it.
+
+    >>> from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
+    >>> bug = CACHE_BUGS["no residual beside bounded geometry"]
+    >>> float(abs(bug.right()).max()), float(bug.wrong().min().round(2))
+    (0.0, -0.94)
+    """
+
+    name: str
+    story: str
+    symptom: str
+    breaks: str
+    right: Callable[[], Array]
+    wrong: Callable[[], Array]
 
 
 CHECKS: Mapping[str, str] = MappingProxyType(

@@ -5,7 +5,6 @@ none needs a renderer, and each has the right model beside the wrong one.  [DDGI
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 
@@ -17,28 +16,8 @@ from restir_ref.transport.cache.integrals import bound
 from restir_ref.transport.cache.leaving import prefiltered
 from restir_ref.transport.cache.rules import AUGMENTED, ORIGINAL, Rule, gathered
 from restir_ref.transport.proofs.zoo import kept
+from restir_ref.transport.proofs.zoo.bug import ModelBug
 from restir_ref.transport.space import ball_volume
-
-
-@dataclass(frozen=True)
-class CacheBug:
-    """A named deliberate error: how it gets into renderers, what it looks like, what it breaks.
-
-    `right` and `wrong` compute the exact relative bias of the model, (places, cells), without the error and with it.
-
-    >>> from restir_ref.transport.proofs.zoo.cached import CACHE_BUGS
-    >>> bug = CACHE_BUGS["no residual beside bounded geometry"]
-    >>> float(abs(bug.right()).max()), float(bug.wrong().min().round(2))
-    (0.0, -0.94)
-    """
-
-    name: str
-    story: str
-    symptom: str
-    breaks: str
-    right: Callable[[], Array]
-    wrong: Callable[[], Array]
-
 
 # ---------------------------------------------------------------- an operator
 
@@ -97,11 +76,11 @@ def crease(residual: float) -> Array:
 CELLWISE = kept.bias_of_frames
 CELLWISE_RIGHT = partial(CELLWISE, kept.cells())
 
-CACHE_BUGS: Mapping[str, CacheBug] = MappingProxyType(
+CACHE_BUGS: Mapping[str, ModelBug] = MappingProxyType(
     {
         bug.name: bug
         for bug in (
-            CacheBug(
+            ModelBug(
                 "constant of the glossy term as printed",
                 "Eq. 6 is taken as it reads, 1 / (2 pi), or from an engine whose probes hold another normalisation.",
                 "dark reflections where a cache is asked for what a glossy surface mirrors",
@@ -109,7 +88,7 @@ CACHE_BUGS: Mapping[str, CacheBug] = MappingProxyType(
                 right=partial(in_a_furnace, prefiltered),
                 wrong=partial(in_a_furnace, as_printed),
             ),
-            CacheBug(
+            ModelBug(
                 "probes without direct light at the second vertex",
                 "Probes of the older method hold what is scattered twice; they are asked where once is missing.",
                 "dark one bounce away from the light, right where light falls first",
@@ -117,7 +96,7 @@ CACHE_BUGS: Mapping[str, CacheBug] = MappingProxyType(
                 right=partial(second_vertex, AUGMENTED),
                 wrong=partial(second_vertex, ORIGINAL),
             ),
-            CacheBug(
+            ModelBug(
                 "no residual beside bounded geometry",
                 "The geometry term is bounded against fireflies, and the rest of it is nobody's.",
                 "dark creases, corners and contacts, fireflies gone",
@@ -125,7 +104,7 @@ CACHE_BUGS: Mapping[str, CacheBug] = MappingProxyType(
                 right=partial(crease, 1.0),
                 wrong=partial(crease, 0.0),
             ),
-            CacheBug(
+            ModelBug(
                 "shading with the kept value",
                 "The query is kept with the sample for selection, and spared in shading as well.",
                 "bright and dark where pixels see the same point from other sides: glossy points, leaks that travel",
@@ -133,7 +112,7 @@ CACHE_BUGS: Mapping[str, CacheBug] = MappingProxyType(
                 right=partial(kept.bias_of_shading, kept.cells(), kept.own),
                 wrong=partial(kept.bias_of_shading, kept.cells(), kept.as_kept),
             ),
-            CacheBug(
+            ModelBug(
                 "target drawn anew where W is formed",
                 "p_hat is a function with one random sample, or one more query, in it, and called once more to divide.",
                 "bright where pixels, or two calls, look up different values of one point",
@@ -141,7 +120,7 @@ CACHE_BUGS: Mapping[str, CacheBug] = MappingProxyType(
                 right=CELLWISE_RIGHT,
                 wrong=partial(CELLWISE, kept.cells(), after=kept.looked_up_again),
             ),
-            CacheBug(
+            ModelBug(
                 "MIS weights that see the kept value",
                 "The target is a mean of products over channels, so that densities depend on what was looked up.",
                 "bright and dark a little, where pixels look up different colours of one point",
@@ -149,7 +128,7 @@ CACHE_BUGS: Mapping[str, CacheBug] = MappingProxyType(
                 right=CELLWISE_RIGHT,
                 wrong=partial(CELLWISE, kept.cells(kept.mean_of_products)),
             ),
-            CacheBug(
+            ModelBug(
                 "kept value of 0 where others see light",
                 "A glossy sample was lost, or a probe is in a wall: what is looked up is 0, and the target with it.",
                 "dark where some pixels look up nothing: walls of probes, glossy lobes below the horizon",

@@ -38,3 +38,26 @@ CACHE_CURES: Mapping[str, str] = MappingProxyType(
     }
 )
 """By the names of bugs about caches."""
+
+GRADIENT_CURES: Mapping[str, str] = MappingProxyType(
+    {
+        "half weight where the shift is undefined": "w = q / (q + q' J) with J = 0 for an undefined shift: w = 1 there",
+        "difference as one integral": "two: base paths of either pixel, weighed so that no light counts twice",
+        "dark base paths thrown away": "weights that compare p_hat, so that dark bases weigh nothing; or keep them",
+        "outer shift applied twice": "evaluate target and weights at the shifted sample, as it is: Eq. 9 and 25",
+        "inner Jacobian in the outer shift": "J* = J_tau of the base path alone; G has the inner one",
+        "offset path not rebuilt": "after the outer shift make the offset path anew, by the inner shift",
+        "probability of the side left out": "divide by the probability 1/2, or take candidates of both sides",
+        "parts added instead of subtracted": "p_hat_+ W_+ minus p_hat_- W_-; try two pixels and their exchange",
+        "difference from one pixel's samples": "both: w_ij of one sample, and w_ji of the other, subtracted",
+        "1/J in the weights of one side": "J belongs to the way of the sample at hand; try w_ij(x) + w_ji(T x) = 1",
+        "targets on one side, densities on the other": "one function for the weights of both sides",
+        "differences of hue in no part": "parts that overlap: max(+-mean d, 0) + a share of mean |d|, d split by them",
+        "moved square ignored one way": "one function moves the place by the fraction, forth and back",
+        "place on the film drawn anew": "the place is a number of the sample: keep it, shift it, J = 1",
+        "share of the area on W": "multiply the confidence by the share, and leave W alone",
+        "overlapped pixel chosen by its sample": "ask all of them, or choose by area; never by what they hold",
+        "normals that agree mark an edge": "an edge is n_i . n_j < 0.9",
+    }
+)
+"""By the names of bugs about differences."""
