@@ -19,3 +19,10 @@ def smaller(id_: str, pair: tuple[Array, Array], limit: float, part: str, caveat
     if few(pair[0]):
         return Claim(id_, None, part, reason=few(pair[0]))
     return Claim(id_, criteria.ratio_below(*pair, limit), part, criteria.ratio_above(*pair, 1), caveat)
+
+
+def told(id_: str, pair: tuple[Array, Array], part: str) -> Claim:
+    """The first variance over the other, reported, if replicas are enough to tell."""
+    if few(pair[0]):
+        return Claim(id_, None, part, reason=few(pair[0]))
+    return Claim(id_, criteria.reported(criteria.ratio_interval(*pair)[2]), part)
