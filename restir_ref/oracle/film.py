@@ -32,6 +32,14 @@ class FilmFrame(Frame):
 
     labels: Array = field(default_factory=lambda: np.zeros((0, PLACES, SUFFIXES), dtype=int))
 
+    def place(self, x: Array) -> Array:
+        """The middle of its place, (1, N)."""
+        return np.asarray((self.part(x) + 0.5) / PLACES)[None]
+
+    def part(self, x: Array) -> Array:
+        """Which of the places x lies in, or has been displaced to; (N,)."""
+        return np.where(x < CELLS, x % CELLS // SUFFIXES, x // CELLS - 1)
+
     def displaced(self, x: Array, by: Array) -> Array:
         """x with its place moved by `by` (1, N) pixels, whole ones left out."""
         return np.asarray(x + CELLS * (1 + (x // SUFFIXES + np.rint(by[0] * PLACES).astype(int)) % PLACES))
@@ -40,7 +48,7 @@ class FilmFrame(Frame):
         """To the suffix of the same label, at the place where x has been displaced to; J is the ratio of volumes."""
         there: FilmFrame = to.of  # type: ignore[assignment]
         i, j, cell = self.ids(index), there.ids(to.index), x % CELLS
-        a, place = cell // SUFFIXES, np.where(x < CELLS, cell // SUFFIXES, x // CELLS - 1)
+        a, place = cell // SUFFIXES, self.part(x)
         label = self.labels[i, a, cell % SUFFIXES]
         y = place * SUFFIXES + (self.labels[j, place] == label[:, None]).argmax(axis=1)
         stays = (i == j) & (a == place)

@@ -411,3 +411,12 @@ def test_the_preset_has_the_numbers_of_the_paper() -> None:
     assert (pairs.trees, pairs.rounds, pairs.neighbours) == (1, 1, 1)
     assert (pixels.cap, pixels.radius, pairs.cap, pairs.radius) == (20, 20, 20, 20)
     assert GRADIENT.partners is SAME_SIGN
+
+
+def test_a_displaced_cell_lies_at_its_place_and_by_around_the_pixel():
+    frame = film_scene(0).now
+    x = np.arange(4)
+    np.testing.assert_array_equal(frame.place(x), [[0.25, 0.25, 0.75, 0.75]])
+    for by in (0.5, -0.5, 1.0):
+        moved = frame.displaced(x, np.full((1, 4), by))
+        np.testing.assert_array_equal(frame.place(moved), (frame.place(x) + by) % 1)
