@@ -76,7 +76,7 @@ def ours(at: Setting, points: Sequence[int], rounds: int, rng: np.random.Generat
 
 def in_block(t: Tracer, block: int, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
     """Primary samples (D, n) of one block and their pixels (n,); two of Sobol's numbers are a place in the block."""
-    u = qmc.Sobol(t.D, rng=rng).random(n).T.copy()
+    u = qmc.Sobol(t.D, seed=rng).random(n).T.copy()  # `rng=` is not known before SciPy 1.15
     rows, columns = (count // SIDE for count in t.sensor.shape)  # type: ignore[attr-defined]
     column, row = u[0] * columns, u[1] * rows
     u[0], u[1] = column % 1, row % 1
