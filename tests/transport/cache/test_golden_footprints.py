@@ -9,6 +9,7 @@ import pytest
 import flatland2d.golden_probes
 import tracer3d.golden_probes
 from restir_ref.transport.cache import golden_footprints
+from tests.transport.cache.ported import wrong
 
 WORLDS = {2: flatland2d.golden_probes, 3: tracer3d.golden_probes}
 FILES = {d: json.loads(world.SHIPPED.read_text(encoding="utf-8"))["footprints"] for d, world in WORLDS.items()}
@@ -53,15 +54,6 @@ class Port:
         each = [self.path(real(found["c"]), *(values[..., k] for values in given.values())) for k in columns]
         names = ("widening", "footprint", "pixel", "ends")
         return {name: np.stack([one[k] for one in each], axis=-1) for k, name in enumerate(names)}
-
-
-def wrong(found, got):
-    """What differs by more than its tolerance, and by which multiple."""
-    worst = {}
-    for name, tolerance in found["tolerance"].items():
-        want = np.array(found["expected"][name])
-        worst[name] = float((abs(got[name] - want) / (abs(want) + abs(want).mean())).max() / tolerance)
-    return worst
 
 
 @pytest.mark.claims("DDGIR-E07", part="golden vectors")

@@ -9,6 +9,7 @@ import pytest
 import flatland2d.golden_probes
 import tracer3d.golden_probes
 from restir_ref.transport.cache import golden
+from tests.transport.cache.ported import wrong
 
 WORLDS = {"plane": flatland2d.golden_probes, "solid": tracer3d.golden_probes}
 FILES = {name: json.loads(world.SHIPPED.read_text(encoding="utf-8")) for name, world in WORLDS.items()}
@@ -104,15 +105,6 @@ class Reader:
         inputs = {key: np.array(value, dtype=self.real) for key, value in self.found["inputs"].items()}
         found = [self.query(*(inputs[key][:, k] for key in ("x", "n", "w", "b"))) for k in range(inputs["x"].shape[1])]
         return {key: np.stack([each[key] for each in found], axis=-1) for key in found[0]}
-
-
-def wrong(found, got):
-    """What differs by more than its tolerance, and by which multiple."""
-    worst = {}
-    for name, tolerance in found["tolerance"].items():
-        want = np.array(found["expected"][name])
-        worst[name] = float((abs(got[name] - want) / (abs(want) + abs(want).mean())).max() / tolerance)
-    return worst
 
 
 @pytest.mark.parametrize("name", WORLDS)
