@@ -9,8 +9,9 @@ overlaps, and the integral over S is the sum of those over its parts.  So it has
 m = 1 is right since a place of S lies in one q only, whose sample alone can be there; samples elsewhere are rejected.
 Nothing moves but by the motion, and the price is that of one pixel: one shift there, and for the weights one back, to
 the q that holds the new sample's place.  1 sample is kept on average, whatever the fraction, and often none or several,
-so that of pixels that are all alike the sum of what is kept has the variance 1 - sum b^2 of its mean squared.
-(The paper refers to Area ReSTIR, one of whose options this is: the words are ours.)
+so that of pixels that are all alike the sum of what is kept has the variance 1 - sum b^2 of its mean squared, anew in
+every frame, which adds up.  (The paper refers to Area ReSTIR, one of whose two options this is; the other, its public
+code's default, moves what lies elsewhere by balance weights.  The words are ours.)
 """
 
 from collections.abc import Iterator, Sequence
