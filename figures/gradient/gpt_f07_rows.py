@@ -14,7 +14,17 @@ import numpy as np
 
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments.following import in_place
-from figures.experiments.gradients import ADAPTIVE, MAP_FRAMES, METHODS, averaged, inner, spread, views_of
+from figures.experiments.gradients import (
+    ADAPTIVE,
+    MAP_FRAMES,
+    METHODS,
+    averaged,
+    gradient_view,
+    inner,
+    sensors_of,
+    spread,
+)
+from figures.experiments.realtime import FRAMES
 from figures.experiments.replicas import told
 from figures.report import style
 from restir_ref.batch import Array
@@ -24,15 +34,25 @@ from restir_ref.gradient_loop import GRADIENT, View
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
 
+TRACED = "path tracing"
+"""The method that has no history, and needs one frame."""
+
 SCENES = ("occluders", "checker", "rack", "cornell")
 SHARES: Mapping[str, int] = MappingProxyType({"with": 1, "after": 2, "path tracing": 4})
 """Images of each method that are averaged; errors are multiplied by their rays."""
 
 
+def last_views(scene: str, asked: Counter[str], frames: int) -> list[View]:
+    """The last frames of a camera that moves, each after the one before."""
+    sensors = sensors_of(f"{scene} row")[-frames:]
+    pairs = zip(sensors, [sensors[0], *sensors], strict=False)
+    return [gradient_view(scene, each, asked, GRADIENT, ADAPTIVE) for each in pairs]
+
+
 def still(views: Sequence[View]) -> list[View]:
     """The last frame of a camera that moves, over and over, seen from where it was before."""
     by = {name: np.zeros_like(group.by) for name, group in views[-1].items()}
-    return [{name: replace(group, by=by[name]) for name, group in views[-1].items()}] * MAP_FRAMES
+    return [{name: replace(group, by=by[name]) for name, group in views[-1].items()}] * min(MAP_FRAMES, len(views))
 
 
 def kept(views: Sequence[View]) -> list[View]:
@@ -53,7 +73,7 @@ def chunks(preset: Any) -> Sequence[dict[str, str]]:
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     """Differences of the inset, (replicas, n), and rays per pixel."""
     asked, row, method = Counter[str](), f"{chunk['scene']} row", chunk["method"]
-    views = CAMERAS[chunk["camera"]](views_of(row, GRADIENT, ADAPTIVE, asked))
+    views = CAMERAS[chunk["camera"]](last_views(chunk["scene"], asked, 1 if method == TRACED else preset["frames"]))
     found = METHODS[method](views, asked, preset["replicas"] * SHARES[method], Live(rng))
     return {"dx": inner(row, "dx", found["dx"]), "rays": found["rays"]}
 
@@ -118,7 +138,7 @@ FIGURE = Figure(
         ),
     ),
     arm="method",
-    presets={"quick": {"replicas": 2}, "paper": {"replicas": 64}},
+    presets={"quick": {"replicas": 2, "frames": 2}, "paper": {"replicas": 64, "frames": FRAMES}},
     chunks=chunks,
     compute=compute,
     combine=combine,
