@@ -13,15 +13,12 @@ import numpy as np
 from restir_ref.batch import Array, entry, ratio, take
 from restir_ref.gradient import SIGNS, Paired, Pairs, gap, omega
 from restir_ref.integrals import Pixels, Reservoirs, shifted
-from restir_ref.mis import WEIGHTS
-from restir_ref.resampling import Input, weigh
+from restir_ref.resampling import Input
 from restir_ref.transport.paths import Path, Tracer
+from restir_ref.transport.proofs.golden.resampled import MIS, landed_in, resampled
 from restir_ref.transport.restir_pt import PathIntegrals
 
 Terms = dict[str, Any]
-
-MIS = "pairwise"
-"""The weights of the pass."""
 
 CONFIDENCES = (1.0, 4.0, 2.0)
 """Of the three inputs of a pass, the canonical one first."""
@@ -109,7 +106,7 @@ def _landed(three: Three) -> Terms:
     """What all signs have in common: y_i = T* x_i in the first pair with J*, its offset path's J, w, and w G."""
     inputs = three.inputs("positive")
     here = inputs[0].at
-    ys, Js = zip(*[_at(each, here) for each in inputs], strict=True)
+    ys, Js = zip(*[landed_in(each, here) for each in inputs], strict=True)
     inner, w, d = zip(*[_difference(y, here) for y in ys], strict=True)
     J = np.stack(Js)
     there = J > 0
@@ -132,51 +129,9 @@ def _of_sign(three: Three, sign: str) -> Mapping[str, Array]:
     """The terms of one sign's reservoir."""
     inputs = three.inputs(sign)
     here = inputs[0].at
-    landed = [_at(each, here) for each in inputs]
-    J = np.stack([J for _, J in landed])
-    w = np.stack([each.p_hat * each.mW for each in weigh(inputs, here, WEIGHTS[MIS])])
-    p_hat = np.where(J > 0, np.stack([here.of.target(here.index, y) for y, _ in landed]), 0)
-    u, s = middle(w)
-    W_Y = ratio(w.sum(axis=0), entry(p_hat, s))
-    f = np.stack([here.of.contribution(here.index, y) for y, _ in landed])
-    return {
-        "W": np.stack([each.X.W for each in inputs]),
-        "p_hat_own": np.stack([each.at.of.target(each.at.index, each.X.x) for each in inputs]),
-        "p_hat": p_hat,
-        "p_hat_from": np.stack([_from(y, J, here, inputs) for y, J in landed]),
-        "u": u,
-        "w": w,
-        "w_sum": w.sum(axis=0),
-        "s": s,
-        "W_Y": W_Y,
-        "estimate": np.where(W_Y > 0, entry(f, s) * W_Y, 0),
-    }
-
-
-def _at(source: Input, here: Pixels) -> tuple[Any, Array]:
-    """The pair's sample in the pair of the pass, and J*; the canonical one as it is.  [GPT Eq. 21-22]"""
-    if source.at is here:
-        return source.X.x, np.ones(len(here.index))
-    y = shifted(source.X.x, source.at, here)
-    return y.x, y.J
-
-
-def _from(y: Any, J: Array, here: Pixels, inputs: list[Input]) -> Array:
-    """p_hat_j(T*_j^-1 y) |dT*_j^-1/dy| of every input's pair j, 0 where y does not exist; (3, P).  [GRIS Eq. 35]"""
-    rows = []
-    for each in inputs:
-        back = shifted(y, here, each.at)
-        rows.append(np.where((J > 0) & (back.J > 0), each.at.of.target(each.at.index, back.x) * back.J, 0))
-    return np.stack(rows)
-
-
-def middle(w: Array) -> tuple[Array, Array]:
-    """A number in the middle of the widest option's interval, a multiple of 2^-12, and the option; (N,) each."""
-    whole = w.sum(axis=0)
-    share = ratio(w, whole)
-    s = share.argmax(axis=0)
-    before = entry(np.cumsum(share, axis=0) - share, s)
-    return np.floor((before + entry(share, s) / 2) * 2**12) / 2**12, s
+    found = resampled(inputs)
+    f = np.stack([here.of.contribution(here.index, landed_in(each, here)[0]) for each in inputs])
+    return {**found, "estimate": np.where(found["W_Y"] > 0, entry(f, found["s"]) * found["W_Y"], 0)}
 
 
 def doubt(d: Array, like: Array) -> Array:
@@ -197,7 +152,7 @@ def margin_of_signs(t: Tracer, x: Path, pixel: Array, passes: Array) -> Array:
     inputs = three.inputs("positive")
     for source in inputs:
         for target in inputs:
-            y, J = (source.X.x, np.ones(three.P)) if source is target else _at(source, target.at)
+            y, J = (source.X.x, np.ones(three.P)) if source is target else landed_in(source, target.at)
             of: Any = target.at.of
             d = of.difference(target.at.index, y)
             light = of.of.target(of.end(target.at.index, y.k).index, y.x)

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from restir_ref.batch import Array, entry, ratio, take
-from restir_ref.integrals import Pixels, Reservoirs, shifted
-from restir_ref.mis import WEIGHTS
-from restir_ref.resampling import Input, weigh
+from restir_ref.batch import Array, entry, take
+from restir_ref.integrals import Pixels, Reservoirs
+from restir_ref.resampling import Input
 from restir_ref.transport import materials as mat
 from restir_ref.transport.mutations import FarPath, Place, Standing, TwoRays, far_record, land
 from restir_ref.transport.paths import Path, Tracer, Tree, leaves, trace
 from restir_ref.transport.proofs.golden import differences
-from restir_ref.transport.proofs.golden.differences import CONFIDENCES, MIS, Terms, middle
+from restir_ref.transport.proofs.golden.differences import CONFIDENCES, Terms
+from restir_ref.transport.proofs.golden.resampled import MIS, landed_in, resampled
 from restir_ref.transport.rays import sample_light
 from restir_ref.transport.record import first_connectable, record
 from restir_ref.transport.restir_pt import PathIntegrals
@@ -171,26 +171,12 @@ def one_pass(t: Tracer, x: Path, chosen: Chosen) -> Terms:
     """Pairwise resampling of three base paths in the pixel of the first: the fields of a dump, and its terms."""
     inputs = _inputs(t, x, chosen)
     here = inputs[0].at
-    landed = [_landed(each, here) for each in inputs]
-    J = np.stack([J for _, J in landed])
-    w = np.stack([each.p_hat * each.mW for each in weigh(inputs, here, WEIGHTS[MIS])])
-    p_hat = np.where(J > 0, np.stack([here.of.target(here.index, y) for y, _ in landed]), 0)
-    u, s = middle(w)
-    w_sum = w.sum(axis=0)
     return {
         "mis": MIS,
         "canonical": [1, 0, 0],
-        "W": np.stack([each.X.W for each in inputs]),
         "c": np.stack([each.X.c for each in inputs]),
-        "p_hat": p_hat,
-        "J": J,
-        "p_hat_own": np.stack([each.at.of.target(each.at.index, each.X.x) for each in inputs]),
-        "p_hat_from": np.stack([_from(y, J, here, inputs) for y, J in landed]),
-        "u": u,
-        "w": w,
-        "w_sum": w_sum,
-        "s": s,
-        "W_Y": ratio(w_sum, entry(p_hat, s)),
+        "J": np.stack([landed_in(each, here)[1] for each in inputs]),
+        **resampled(inputs),
     }
 
 
@@ -203,23 +189,6 @@ def _inputs(t: Tracer, x: Path, chosen: Chosen) -> list[Input]:
         )
         for i, (row, c) in enumerate(zip(chosen.passes, CONFIDENCES, strict=True))
     ]
-
-
-def _landed(source: Input, here: Pixels) -> tuple[Path, Array]:
-    """The path in the pixel of the pass, and J; the canonical one as it is."""
-    if source.at is here:
-        return source.X.x, np.ones(len(here.index))
-    y = shifted(source.X.x, source.at, here)
-    return y.x, y.J
-
-
-def _from(y: Path, J: Array, here: Pixels, inputs: list[Input]) -> Array:
-    """p_hat_j(T_j^-1 y) |dT_j^-1/dy| of every input j, 0 where y does not exist; (M, N).  [GRIS Eq. 35]"""
-    rows = []
-    for each in inputs:
-        back = shifted(y, here, each.at)
-        rows.append(np.where((J > 0) & (back.J > 0), each.at.of.target(each.at.index, back.x) * back.J, 0))
-    return np.stack(rows)
 
 
 # ---------------------------------------------------------------- mutations
