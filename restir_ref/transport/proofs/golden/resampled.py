@@ -47,7 +47,7 @@ def p_hat_from(y: Any, J: Array, here: Pixels, inputs: list[Input]) -> Array:
     rows = []
     for each in inputs:
         back = shifted(y, here, each.at)
-        rows.append(np.where((J > 0) & (back.J > 0), each.at.of.target(each.at.index, back.x) * back.J, 0))
+        rows.append(np.where(J > 0, each.at.of.target(each.at.index, back.x) * back.J, 0))
     return np.stack(rows)
 
 
