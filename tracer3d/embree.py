@@ -20,6 +20,7 @@ from restir_ref.batch import Array, take, total
 from restir_ref.transport.coincidence import coincidence
 from restir_ref.transport.intersection import CLEARANCE, Matrices
 from restir_ref.transport.scene import Scene
+from restir_ref.transport.sheets import Sheets
 from restir_ref.transport.vectors import norm
 
 START, ABOVE, LOST = 2.0**-21, 2.0**-20, 2.0**15
@@ -187,4 +188,5 @@ def _balls(s: Matrices) -> Matrices:
     """The balls alone."""
     maps, offsets = s.maps[:0], s.offsets[:0]
     none = coincidence(np.zeros((2, 0), dtype=int), np.zeros(0), s.coincidence.normals, maps, offsets)
-    return replace(s, maps=maps, offsets=offsets, coincidence=none)
+    sheets = Sheets(maps, offsets, 0, np.tile(np.arange(s.radii.size), (2, 1)))
+    return replace(s, maps=maps, offsets=offsets, sheets=sheets, coincidence=none)

@@ -1,14 +1,15 @@
-"""Where rays meet surfaces, and what stands between two points: matrix products over all simplices.
+"""Where rays meet surfaces, and what stands between two points: matrix products over all sheets.
 
 A simplex with corners v_0 .. v_(d-1) has an affine map to coordinates b >= 0 with sum b <= 1 and to a
 height h along its normal.  A ray x + t w crosses its plane at 1/t = -h'/h, and is inside if that times
 b, b(x)/t + b', is >= 0 and sums to at most 1/t: one division per simplex, and the maps are matrix products.
+Where two simplices make a box (see `sheets`), each 1/t b is at most 1/t, and their sum tells which of the two it is.
 
 Floating point: what lies within CLEARANCE of a surface is on it, and neither meets nor is hidden by
 it, at any angle.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -17,13 +18,14 @@ import numpy as np
 
 from restir_ref.batch import Array, ratio, total
 from restir_ref.transport.coincidence import Coincidence, foremost
+from restir_ref.transport.sheets import Sheets
 from restir_ref.transport.vectors import dot
 
 CLEARANCE = 1e-10
 """Heights below this share of the scene's extent are 0."""
 
 BLOCK = 2**15
-"""Simplices times rays to be treated at once: what stays in the cache; never more than 4 times as many."""
+"""Sheets times rays to be treated at once: what stays in the cache; never more than 4 times as many."""
 
 # Hazard: glibc gives freed memory back to the system at once, and every temporary array then costs
 # page faults, 5 times the arithmetic.  Once a large array has come and gone (this one is never
@@ -48,12 +50,13 @@ class Surfaces(Protocol):
 class Matrices:
     """`Surfaces` by asking all of them at once.
 
-    maps (d S, d), offsets (d S, 1)  coordinates first, heights last
+    maps (d S, d), offsets (d S, 1)  of facets: coordinates first, heights last;  sheets  the same, two by two
     centres (d, B), radii (B, 1);  extent  of which CLEARANCE is a share
     """
 
     maps: Array
     offsets: Array
+    sheets: Sheets
     centres: Array
     radii: Array
     extent: float
@@ -65,14 +68,14 @@ class Matrices:
         return int(self.maps.shape[1])
 
     @property
-    def simplices(self) -> int:
-        """S + B."""
-        return len(self.maps) // self.d + self.radii.size
+    def asked(self) -> int:
+        """Sheets and balls."""
+        return self.sheets.P + self.radii.size
 
     def intersect(self, x: Array, w: Array) -> tuple[Array, Array]:
         """Distance and primitive, block by block."""
         near, prim = np.empty(x.shape[-1]), np.empty(x.shape[-1], dtype=int)
-        for part in blocks(self.simplices, x.shape[-1]):
+        for part in blocks(self.asked, x.shape[-1]):
             near[part], prim[part] = _nearest(self, x[:, part], w[:, part])
         if self.coincidence.others.size:
             hit = np.flatnonzero(near)
@@ -84,7 +87,7 @@ class Matrices:
     def visible(self, x: Array, y: Array) -> Array:
         """Whether nothing stands between x and y, block by block."""
         clear = np.empty(x.shape[-1], dtype=bool)
-        for part in blocks(self.simplices, x.shape[-1]):
+        for part in blocks(self.asked, x.shape[-1]):
             clear[part] = ~_facets_between(self, x[:, part], y[:, part])
             if self.radii.size:
                 clear[part] &= ~_balls_between(self, x[:, part], y[:, part])
@@ -95,14 +98,14 @@ class Matrices:
         return foremost(self.coincidence, x, prim, w)
 
 
-def blocks(simplices: int, n: int) -> Iterator[slice]:
-    """Slices of the batch axis: BLOCK / S columns, or 256 if these are more, cut where S times that exceeds 4 BLOCK.
+def blocks(asked: int, n: int) -> Iterator[slice]:
+    """Slices of the batch axis: BLOCK / P columns, or 256 if these are more, cut where P times that exceeds 4 BLOCK.
 
     Narrower ones would cost more by their number than they save in the cache.
 
     Hazard: BLAS rounds a lone column in another way, so cutting must not leave one.
     """
-    wide, most = max(BLOCK // simplices, 256), max(4 * BLOCK // simplices, 3)
+    wide, most = max(BLOCK // asked, 256), max(4 * BLOCK // asked, 3)
     for at in range(0, n, wide):
         width = min(wide, n - at)
         parts = -(-width // most)
@@ -112,33 +115,50 @@ def blocks(simplices: int, n: int) -> Iterator[slice]:
 
 def _nearest(s: Matrices, x: Array, w: Array) -> tuple[Array, Array]:
     """1 / t of the nearest surface (n,), 0 if there is none, and its primitive (n,)."""
-    near = _facet_nearness(s, x, w)
+    near, b = _crossings(s, x, w)
     if s.radii.size:
         near = np.concatenate([near, _ball_nearness(s, x, w)])
     nearest = near.max(axis=0)
     index = np.arange(len(near), dtype=np.min_scalar_type(len(near)))[:, None]
-    prim = ((near == nearest) * index).max(axis=0)  # argmax(axis=0), but 3 times as fast
-    return nearest, prim * (nearest > 0)
+    found = ((near == nearest) * index).max(axis=0).astype(int)  # argmax(axis=0), but 3 times as fast
+    return nearest, _primitive(s.sheets, found, nearest, b) * (nearest > 0)
 
 
-def _facet_nearness(s: Matrices, x: Array, w: Array) -> Array:
-    """1 / t of the crossing with each facet, 0 if it is missed; (S, n)."""
-    *b, h = _coordinates(s, x)
-    *back, descent = _product(s.maps, -w).reshape(s.d, -1, w.shape[-1])
+def _primitive(sheets: Sheets, found: Array, near: Array, b: Sequence[Array]) -> Array:
+    """Which facet of the sheet that was met, or which ball, (n,)."""
+    if not sheets.boxes:
+        return np.asarray(sheets.prims[0].take(found))
+    at = np.minimum(found, sheets.P - 1) * len(near) + np.arange(len(near))
+    beyond = total([b_k.ravel().take(at) for b_k in b]) > near
+    return np.asarray(sheets.prims[beyond.astype(int), found])
+
+
+def _crossings(s: Matrices, x: Array, w: Array) -> tuple[Array, list[Array]]:
+    """1 / t of the crossing with each sheet, 0 if it is missed, and 1 / t times its coordinates; (P, n) each."""
+    *b, h = _coordinates(s.sheets, x)
+    *back, descent = _product(s.sheets.maps, -w).reshape(s.d, -1, w.shape[-1])
     h[np.abs(h) <= CLEARANCE * s.extent] = np.inf
     near = np.asarray(descent / h)
     scaled = [b_k * near - back_k for b_k, back_k in zip(b, back, strict=True)]
-    hit = (near > 0) & (total(scaled) <= near)
-    for b_k in scaled:
-        hit &= b_k >= 0
-    return near * hit
+    return near * ((near > 0) & _inside(s.sheets.boxes, scaled, near)), scaled
 
 
-def _coordinates(s: Matrices, x: Array) -> Array:
-    """Coordinates and height of points x in all facets, (d, S, n)."""
-    at = _product(s.maps, x)
-    at += s.offsets
-    return at.reshape(s.d, -1, x.shape[-1])
+def _inside(boxes: int, b: Sequence[Array], one: Array) -> Array:
+    """Whether coordinates b, times `one`, lie in the sheets, of which the first ones are boxes; (P, n)."""
+    inside = total([b_k[boxes:] for b_k in b]) <= one[boxes:]
+    if boxes:
+        in_box = np.logical_and.reduce([b_k[:boxes] <= one[:boxes] for b_k in b])
+        inside = np.concatenate([in_box, inside])
+    for b_k in b:
+        inside &= b_k >= 0
+    return np.asarray(inside)
+
+
+def _coordinates(sheets: Sheets, x: Array) -> Array:
+    """Coordinates and height of points x in all sheets, (d, P, n)."""
+    at = _product(sheets.maps, x)
+    at += sheets.offsets
+    return at.reshape(len(x), -1, x.shape[-1])
 
 
 def _product(maps: Array, x: Array) -> Array:
@@ -167,16 +187,14 @@ def _depth(s: Matrices, x: Array) -> tuple[Array, Array]:
 
 
 def _facets_between(s: Matrices, x: Array, y: Array) -> Array:
-    """Whether heights have opposite signs and (b(x) h(y) - b(y) h(x)) / (h(y) - h(x)) is inside a facet; (n,)."""
-    (*b_x, h_x), (*b_y, h_y) = _coordinates(s, x), _coordinates(s, y)
+    """Whether heights have opposite signs and (b(x) h(y) - b(y) h(x)) / (h(y) - h(x)) is inside a sheet; (n,)."""
+    (*b_x, h_x), (*b_y, h_y) = _coordinates(s.sheets, x), _coordinates(s.sheets, y)
     least = CLEARANCE * s.extent
     hidden = (np.minimum(h_x, h_y) < -least) & (np.maximum(h_x, h_y) > least)
     with np.errstate(divide="ignore", invalid="ignore"):
         scale = 1 / (h_y - h_x)
         b = [(k_x * h_y - k_y * h_x) * scale for k_x, k_y in zip(b_x, b_y, strict=True)]
-        hidden &= total(b) <= 1
-        for b_k in b:
-            hidden &= b_k >= 0
+        hidden &= _inside(s.sheets.boxes, b, np.ones((s.sheets.P, 1)))
     return np.asarray(hidden.any(axis=0))
 
 

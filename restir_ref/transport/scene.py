@@ -9,10 +9,8 @@ from restir_ref.batch import Array
 from restir_ref.transport.coincidence import coincidence, coincident
 from restir_ref.transport.intersection import CLEARANCE, Matrices, Surfaces
 from restir_ref.transport.materials import Material, Table, table
+from restir_ref.transport.sheets import affine_maps, sheets
 from restir_ref.transport.space import Space
-
-EDGE = 1e-12
-"""Simplices are larger by this much of themselves, so that neighbours leave no gap."""
 
 FAR = 1e4
 """Coordinates reach at most so many times the scene's size: beyond, they are too coarse for what is told apart."""
@@ -112,7 +110,7 @@ def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], 
     centres = np.array([ball.centre for ball in balls], dtype=float).reshape(-1, space.d).T
     radii = np.array([ball.radius for ball in balls], dtype=float).reshape(-1, 1)
     extent = _extent(np.concatenate([corners.reshape(-1, space.d).T, centres - radii.T, centres + radii.T], axis=1))
-    maps, offsets = _maps(corners, normals)
+    maps, offsets = affine_maps(corners, normals)
     pairs = coincident(corners, maps, offsets, CLEARANCE * extent)
     _check_lamps(pairs, normals, emission)
     together = coincidence(pairs, emission.max(axis=0) > 0, normals.T.copy(), maps, offsets)
@@ -128,7 +126,7 @@ def scene(space: Space, materials: Sequence[Material], facets: Sequence[Facet], 
         pdf_area,
         _lights(corners, normals, emission, pdf_area, share),
         extent,
-        Matrices(maps, offsets, centres, radii, extent, together),
+        Matrices(maps, offsets, sheets(corners, normals, len(balls)), centres, radii, extent, together),
     )
 
 
@@ -203,17 +201,6 @@ def _normals_and_sizes(corners: Array) -> tuple[Array, Array]:
             f"facet {worst} is degenerate: its corners are {corners[worst].tolist()}; move them apart, or leave it out."
         )
     return normals / length[:, None], length / np.prod(np.arange(1, d))
-
-
-def _maps(corners: Array, normals: Array) -> tuple[Array, Array]:
-    """Barycentric coordinates 1 .. d-1 of the facet enlarged by EDGE, then heights: maps (d S, d), offsets (d S, 1)."""
-    d = corners.shape[-1]
-    matrix = np.concatenate([corners[:, 1:] - corners[:, :1], normals[:, None]], axis=1).swapaxes(1, 2)
-    maps = np.linalg.inv(matrix).swapaxes(0, 1) / (1 + d * EDGE)  # (d, S, d)
-    maps[-1] = normals
-    offsets = -np.einsum("ksd,sd->ks", maps, corners[:, 0])
-    offsets[:-1] += EDGE / (1 + d * EDGE)
-    return maps.reshape(-1, d).copy(), offsets.reshape(-1, 1)
 
 
 def _lights(corners: Array, normals: Array, emission: Array, pdf_area: Array, share: Array) -> Lights:

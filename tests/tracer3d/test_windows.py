@@ -86,4 +86,4 @@ def test_beside_a_window_a_frame_holds_its_reservoirs_old_and_new_and_little_els
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_whole_frame_at_once_holds_many_times_as_much(preset):
-    assert growth(PRESETS[preset]) > 10
+    assert growth(PRESETS[preset]) > 8

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from restir_ref.batch import Array
-from restir_ref.transport import intersection
-from restir_ref.transport import scene as scenes
+from restir_ref.transport import intersection, sheets
 from restir_ref.transport.intersection import CLEARANCE
 from restir_ref.transport.rays import arrive, normal, vertex
 from restir_ref.transport.scene import Ball, Facet, Scene, scene
@@ -134,7 +133,7 @@ def test_no_ray_slips_out_between_two_walls(space):
 
 @every_space
 def test_without_an_edge_rays_do_slip_out(space, monkeypatch):
-    monkeypatch.setattr(scenes, "EDGE", 0.0)
+    monkeypatch.setattr(sheets, "EDGE", 0.0)
     assert leaks(space) > 0
 
 

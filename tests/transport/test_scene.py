@@ -18,7 +18,8 @@ from restir_ref.transport.paths import Tracer, radiance, trace
 from restir_ref.transport.proofs.judge import judge, report
 from restir_ref.transport.proofs.shift_checks import Effort
 from restir_ref.transport.restir_pt import PathIntegrals
-from restir_ref.transport.scene import EDGE, FAR, Ball, Facet, scene
+from restir_ref.transport.scene import FAR, Ball, Facet, scene
+from restir_ref.transport.sheets import EDGE
 from tests.transport.paths import HYBRID
 from tests.transport.rooms import MATTE, soup, walls
 from tests.transport.spaces import SPACES
