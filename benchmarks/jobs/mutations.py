@@ -32,7 +32,7 @@ from tests.transport.paths import HYBRID
 
 FRAMES, SIGMA, REPLICAS, PIXELS_AT_ONCE, EPS = 3, 0.1, 64, 8, 0.005
 LOOP = replace(REAL_TIME, trees=8)
-CHUNKS: Mapping[str, int] = MappingProxyType({"ajar": 128, "clear_coat": 64, "crease": 32})
+CHUNKS: Mapping[str, int] = MappingProxyType({"ajar": 320, "clear_coat": 576, "crease": 160})
 
 
 @dataclass(frozen=True)
