@@ -258,6 +258,7 @@ THEORY = (
     "images",
     "area",
     "squares",
+    "gathering",
     "gradient",
     "gradient_loop",
     "poisson",

@@ -135,7 +135,7 @@ Inputs = Callable[[Film, Reservoirs, Sequence[Past]], list[Input]]
 Following = Callable[[Sequence[int], Array, Array, Chance], Inputs]
 """How history follows the motion: by the shape of the previous image, `by` (film, n) and columns (N,), for all parts.
 
-`moving` it into the square, or `squares.keeping` what is there.
+`moving` it into the square, `squares.keeping` what is there, or both: `gathering.gathering`.
 """
 
 

@@ -11,15 +11,15 @@ Nothing moves but by the motion, and the price is that of one pixel: one shift t
 the q that holds the new sample's place.  1 sample is kept on average, whatever the fraction, and often none or several,
 so that of pixels that are all alike the sum of what is kept has the variance 1 - sum b^2 of its mean squared, anew in
 every frame, which adds up.  (The paper refers to Area ReSTIR, one of whose two options this is; the other, its public
-code's default, moves what lies elsewhere by balance weights.  The words are ours.)
+code's default, moves what lies elsewhere into the square by balance weights: `gathering`.  The words are ours.)
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from restir_ref.area import Displaced, Film, Inputs, Past, lattice, overlapped
+from restir_ref.area import Displaced, Film, Following, Inputs, Past, lattice, overlapped
 from restir_ref.batch import Array, total
 from restir_ref.chance import Chance
 from restir_ref.integrals import NOWHERE, Pixels, Reservoirs, Sample, Shifted, target
@@ -150,11 +150,22 @@ def in_squares(Y: Reservoirs, at: Pixels, chance: Chance) -> list[Input]:
     return [Input(select(offered, chance, total(c)), at)] if offered else []
 
 
-def keeping(shape: Sequence[int], by: Array, index: Array, chance: Chance) -> Inputs:
-    """Samples stay, and those in the square are kept: `area.Following` of the loop.  [Zhang 2024]"""
+Collecting = Callable[[Reservoirs, Pixels, Chance], list[Input]]
+"""Reservoirs of capped confidence and `Squares` of their frame: at most one input, what these have."""
 
-    def inputs(of: Film, X: Reservoirs, past: Sequence[Past]) -> list[Input]:
-        history = [in_squares(Y, Pixels(Squares(before, shape, by), index), chance) for before, Y in past]
-        return [Input(X, Pixels(Carried(of, by), index)), *(source for each in history for source in each)]
 
-    return inputs
+def following(collect: Collecting) -> Following:
+    """The loop's history in the squares of every part, collected in this way."""
+
+    def follow(shape: Sequence[int], by: Array, index: Array, chance: Chance) -> Inputs:
+        def inputs(of: Film, X: Reservoirs, past: Sequence[Past]) -> list[Input]:
+            history = [collect(Y, Pixels(Squares(before, shape, by), index), chance) for before, Y in past]
+            return [Input(X, Pixels(Carried(of, by), index)), *(source for each in history for source in each)]
+
+        return inputs
+
+    return follow
+
+
+keeping = following(in_squares)
+"""Samples stay, and those in the square are kept: `area.Following` of the loop.  [Zhang 2024]"""

@@ -9,6 +9,7 @@ import numpy as np
 from figures.experiments.gradients import Spatial
 from figures.experiments.pans import paired
 from restir_ref.area import moving, one_by_area
+from restir_ref.gathering import gathering
 from restir_ref.gradient_loop import GradientPreset, View
 from restir_ref.squares import keeping
 from restir_ref.transport.rays import arrive
@@ -49,3 +50,8 @@ def frugal(view: View) -> View:
 def in_place(view: View) -> View:
     """The same with what lies in the square, of all overlapped pixels, kept where it is."""
     return {name: replace(group, follow=keeping) for name, group in view.items()}
+
+
+def gathered(view: View) -> View:
+    """The same with what lies in the square kept where it is, and what lies elsewhere moved into it."""
+    return {name: replace(group, follow=gathering) for name, group in view.items()}
