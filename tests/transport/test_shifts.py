@@ -295,6 +295,40 @@ def test_a_path_shifted_into_its_own_pixel_is_itself(scene, rule) -> None:
     assert np.abs(y.F / s.x.F - 1)[:, J > 0].max() < 1e-6
 
 
+def composed(s, step, through=shift_path) -> np.ndarray:
+    """Columns in which T_hr T_qh x and T_qr x, r = h + step, are not one path with one J, of those that are in h."""
+    r = (s.j + step) % s.t.sensor.n
+    (two, onward), (one, J) = through(s.t, s.y, r), through(s.t, s.x, r)
+    same = np.isclose(two.F, one.F, rtol=1e-6, atol=0).all(axis=0) & np.isclose(s.J * onward, J, rtol=1e-6, atol=0)
+    return ((J > 0) != (onward > 0)) | (J > 0) & ~same
+
+
+@pytest.mark.claims("GPT-A05", part="images of a sample compose")
+@every_rule
+@every_scene
+def test_two_shifts_one_after_the_other_are_the_shift_to_where_they_end(scene, rule) -> None:
+    s = successful(shifts(SCENES[scene](), RULES[rule], N, seed=11))
+    assert composed(s, 3).mean() <= EDGE_CASES
+
+
+@pytest.mark.claims("GPT-A05", part="images of a sample compose", world="tracer3d")
+@every_rule
+@pytest.mark.parametrize("name", FURNISHED)
+def test_two_shifts_are_one_in_rooms_of_any_dimension(name, rule) -> None:
+    s = successful(furnished_shifts(name, RULES[rule], 4000, seed=12))
+    assert composed(s, 1).mean() <= EDGE_CASES
+
+
+def test_shifts_that_are_bounded_on_both_sides_do_not_compose() -> None:
+    def careful(t, x, pixel):
+        y, J = shift_path(t, x, pixel)
+        return y, np.where((J >= 0.5) & (J <= 2), J, 0)
+
+    s = furnished_shifts("solid", RULES["hybrid"], 4000, seed=12)
+    s = successful(replace(s, J=np.where((s.J >= 0.5) & (s.J <= 2), s.J, 0)))
+    assert composed(s, 1, careful).mean() > 10 * EDGE_CASES
+
+
 @pytest.mark.claims("GRIS-A13")
 @pytest.mark.parametrize("rule", ["hybrid", "reconnection"])
 def test_glossy_first_lobes_and_mirror_lamps_are_retraced_alike(rule) -> None:
