@@ -5,8 +5,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from figures.experiments.following import gathered
 from figures.gradient import gpt_f07_rows as rows
 from restir_ref.area import MOVED
+from restir_ref.gathering import gathering
 from restir_ref.gradient_loop import PRIMAL
 from restir_ref.squares import keeping
 
@@ -30,9 +32,10 @@ def test_a_camera_at_rest_sees_the_last_frame_as_often_as_there_are_frames(views
     assert all(view[PRIMAL].of is views[-1][PRIMAL].of for view in standing)
 
 
-def test_history_is_kept_in_place_or_moved(views):
+def test_history_is_kept_in_place_or_moved_or_gathers(views):
     assert {group.follow for view in rows.kept(views) for group in view.values()} == {keeping}
     assert {group.follow for view in rows.CAMERAS["moving, moved"](views) for group in view.values()} == {MOVED}
+    assert {group.follow for view in views for group in gathered(view).values()} == {gathering}
 
 
 def test_errors_are_variances_times_the_rays_of_all_images_that_are_averaged():
