@@ -187,9 +187,9 @@ FIGURE = Figure(
     arm="method",
     presets={
         "quick": {
-            "side": 20,
+            "side": 18,
             SPACE.glass: {"hybrid": 8, "reconnection": 16, PT: 64, DIRECT: 8, KEPT: 12, TRUTH: 2},
-            SPACE.distant: {"hybrid": 4, "reconnection": 4, KEPT: 24, TRUTH: 4},
+            SPACE.distant: {"hybrid": 4, "reconnection": 4, KEPT: 24, TRUTH: 2},
             "blocks": {SPACE.glass: {}, SPACE.distant: {}},
         },
         "paper": {
