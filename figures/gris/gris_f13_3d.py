@@ -142,7 +142,7 @@ def draw(a: Arrays) -> "Picture":
     for axis, scene in zip(axes[0], SCENES, strict=False):
         images = {TRUTH: a[f"{scene}.{TRUTH}"], **{name: a[f"{scene}.{name}"][0] for name in shown(scene)}}
         side = math.isqrt(len(images[TRUTH]))
-        style.crops(axis, images, side=side, title=f"{scene}, frame {realtime.FRAMES} of a moving camera")
+        style.crops(axis, images, side=side, title=f"{scene}: one frame")
     _frames(axes[0, 2], a)
     return picture
 
@@ -160,8 +160,8 @@ def _frames(axis: "Axes", a: Arrays) -> None:
             look = style.look(name, label=f"{name}, {where}") | {"lw": 1 + k}
             axis.plot(found, (np.arange(len(found)) + 0.5) / len(found), markevery=0.15, **look)
     axis.set(xscale="log", xlabel="relMSE of the caustic, frame by frame", ylabel="share of frames below", ylim=(0, 1))
-    axis.set_title("Errors (path tracing: equal rays)")
-    style.below(axis, ncols=1)
+    axis.set_title("Errors")
+    style.below(axis, ncols=2)
 
 
 FIGURE = Figure(
