@@ -188,7 +188,7 @@ FIGURE = Figure(
     arm="method",
     presets={
         "quick": {
-            "side": 18,
+            "side": 16,
             SPACE.glass: {"hybrid": 8, "reconnection": 16, PT: 64, DIRECT: 8, KEPT: 12, TRUTH: 2},
             SPACE.distant: {"hybrid": 4, "reconnection": 4, KEPT: 24, TRUTH: 2},
             "blocks": {SPACE.glass: {}, SPACE.distant: {}},
