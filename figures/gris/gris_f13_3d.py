@@ -2,8 +2,8 @@
 
 As in flatland, by the same code: the last of twenty frames of a moving camera, in a square crop that follows what its
 middle sees.  Before errors are compared, the share of the caustic's light is measured that each shift keeps on the way
-to a neighbour: both scenes have to hold what the paper gives as the reason.  Window3 was chosen by this share alone; how
-large it is in the paper's San Miguel is not known.  The truth is path tracing by lattices.
+to a neighbour: both scenes have to hold what the paper gives as the reason.  Window3 was chosen by this share alone;
+how large it is in the paper's San Miguel is not known.  The truth is path tracing by lattices.
 """
 
 import math
