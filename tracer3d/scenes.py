@@ -201,15 +201,16 @@ def glass_ball() -> Setting:
 
 
 def distant_caustic() -> Setting:
-    """Window3: a small glossy panel mirrors a small distant window onto the wall in view."""
-    shiny = Material([Layer("ggx", grey(0.95), 0.12)])
-    floor, ceiling, seen, front, right, back = walls(2.0)
-    panel = [(0.62, 0.0734, 0.56), (0.62, 0.0734, 0.44), (0.50, 0.0866, 0.44), (0.50, 0.0866, 0.56)]
-    window = [(1.995, 0.60, 0.47), (1.995, 0.60, 0.53), (1.995, 0.66, 0.53), (1.995, 0.66, 0.47)]
-    shell = [*joined([floor, ceiling, front, right, back], 0), *quad(seen, 1)]
-    facets = [*shell, *quad(panel, 2), *quad(window, 0, grey(80.0))]
-    inside = scene(SOLID, [matte(grey(0.2)), matte(grey(0.6)), shiny], facets)
-    return Setting(inside, (0.7, 0.6, 0.9), (0.0, 0.45, 0.5), (928, 508))
+    """Window3: a window pane across the room mirrors a lamp, which stands before it, onto a small ball in view.
+
+    Pixels of a ball look to all sides: one direction, replayed from another pixel, leaves the lamp's image on the pane.
+    """
+    pane = [(1.45, 0.4, 0.25), (1.45, 0.4, 0.75), (1.45, 0.9, 0.75), (1.45, 0.9, 0.25)]
+    light = [(1.2, 0.78, 0.43), (1.2, 0.92, 0.43), (1.2, 0.92, 0.57), (1.2, 0.78, 0.57)]
+    facets = [*joined(walls(1.5), 0), *quad(pane, 2), *quad(light, 0, grey(40.0))]
+    materials = [matte(grey(0.2)), matte(grey(0.6)), Material([Layer("ggx", grey(0.95), 0.12)])]
+    inside = scene(SOLID, materials, facets, [Ball((0.3, 0.5, 0.5), 0.07, 1)])
+    return Setting(inside, (0.9, 0.5, 0.97), (0.356, 0.5105, 0.5406), (928, 508))
 
 
 def many_lights() -> Setting:
