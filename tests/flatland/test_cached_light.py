@@ -32,7 +32,7 @@ from restir_ref.transport.cache.integrals import (
     radiance,
     unseen,
 )
-from restir_ref.transport.cache.leaving import Cache, never_lost
+from restir_ref.transport.cache.leaving import Cache, gloss, never_lost
 from restir_ref.transport.cache.queries import QUERIES, counted
 from restir_ref.transport.cache.shading import bounded, plain, residual
 from restir_ref.transport.counting import CLOSEST, SHADOW
@@ -204,6 +204,50 @@ def test_dividing_by_a_redrawn_value_is_biased() -> None:
     found = replicated(shown(here, replace(frame, X=redrawn(here, frame.X, chance)), chance)).mean(axis=1)
     assert biased(found, shiny_truth().mean(), 0.01, 1).passed
     assert np.median(shiny_image(128, redrawn).mean(axis=1)) > 3 * shiny_truth().mean()
+
+
+def by_contributions(here: Pixels, chance: Live) -> Array:
+    """The image by `shade` alone: bounded light by f W (L_e + L+), the rest by the ray."""
+    frame = reused(here, chance, 3)
+    return replicated(shade(frame.X, here) + residual(here.of, here.index, frame.found, plain, chance))
+
+
+def test_contributions_ask_for_this_pixel_and_are_unbiased() -> None:
+    blocks, here = mean_and_blocks(shiny_truth(), 4), shiny(768)
+    found = by_contributions(here, Live(np.random.default_rng(1)))
+    assert all_unbiased(mean_and_blocks(found, 4), blocks, eps=0.02).passed
+
+
+@pytest.mark.claims("DDGIR-C03", part="control")
+def test_contributions_by_the_kept_value_are_biased(monkeypatch) -> None:
+    """The last block, which looks at the walls' bright side, gets 5 % too much; both ways see the same samples."""
+    here, right = shiny(768), mean_and_blocks(shiny_truth(), 4)[-1]
+    own = by_contributions(here, Live(np.random.default_rng(1)))
+    monkeypatch.setattr(CacheIntegrals, "contribution", lambda of, index, x: x.f * x.L)
+    off = by_contributions(here, Live(np.random.default_rng(1))) - own
+    assert biased(mean_and_blocks(off, 4)[:, -1] + right, right, 0.02, 1).passed
+
+
+@pytest.mark.parametrize("sampled", [gloss, never_lost])
+def test_a_lost_glossy_sample_steers_the_selection_and_carries_nothing(sampled) -> None:
+    """Where gloss is lost, `never_lost` asks along the mirror's direction: for targets, not for contributions."""
+    here, chance = shiny(64), Live(np.random.default_rng(1))
+    x = drawn(here, chance).X.x
+    at = connection(here.of, here.index, x)
+    asked_for = x.f * radiance(here.of.cache, x, at, sampled)
+    same = (here.of.contribution(here.index, x) == asked_for).all()
+    assert same == (sampled is gloss)
+    assert (x.f * asked(here.of, x, at) >= asked_for - 1e-12).all()
+
+
+def test_a_target_is_the_product_of_two_means_over_channels() -> None:
+    """Red light on a blue surface: no product is positive, and the target is; else weights would see the value."""
+    here = lighted("crease", 1)
+    x = drawn(here, Live(np.random.default_rng(1))).X.x
+    f, L = (np.repeat(np.eye(3)[:, k : k + 1], len(here.index), axis=1) for k in (0, 2))
+    found = here.of.target(here.index, replace(x, f=f, L=3 * L))
+    np.testing.assert_allclose(found, 1 / 3)
+    assert (f * L == 0).all()
 
 
 # ---------------------------------------------------------------- what it costs
