@@ -14,6 +14,7 @@ from restir_ref.batch import Array, changed, take
 from restir_ref.chance import Live
 from restir_ref.decorrelation import STEPS, mutations
 from restir_ref.integrals import Pixels
+from restir_ref.transport import materials as mat
 from restir_ref.transport import mutations as module
 from restir_ref.transport.counting import counted, rays
 from restir_ref.transport.mutations import (
@@ -31,6 +32,7 @@ from restir_ref.transport.paths import RECONNECTION, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.retracing import inside, traced
 from restir_ref.transport.shifts import shift_path
+from restir_ref.transport.vectors import normalize
 from tests.transport.furnished import FURNISHED, furnished_shifts
 from tests.transport.mutated import (
     PIXELS,
@@ -258,6 +260,22 @@ def test_proposals_that_would_are_noticed(monkeypatch) -> None:
     _, J = shift_path(m.t, m.x_new, m.i)
     assert (traced(m.t, own(m.t, m.x_new, m.i), m.i, m.x.k, m.x.nee).c != m.x.c).mean() > 0.01
     assert (J == 0).mean() > 0.01  # not even the shift to its own pixel is defined
+
+
+def test_numbers_of_which_the_lobe_samples_nothing_are_no_mutation() -> None:
+    """The view's direction stands in for the one that is not there, and the lobe could have sampled that."""
+    of = TwoRays(tracer("glossy_cornell"), STEP)
+    X, here = reused(of, 6, seed=1)
+    there, s = of.standing(X, here.index), of.tracer.scene
+    x, v = take(X.x, there.columns), there.at.v
+    u = np.resize([1e-6, 1 - 1e-6], (1, len(there.columns)))  # at the horizons of the visible normals
+    turn = ByNumbers(0.1, lambda old, sigma, chance: (u, np.ones(u.shape[-1])))
+    w, T = turn(of.tracer, v, x.lobe_in, normalize(x.z - v.x), Live(np.random.default_rng(4)))
+    nothing = mat.sample_lobe(s.materials, s.space, v, x.lobe_in, u)[-1] == 0
+    assert nothing.sum() > 5
+    assert ((T == 0) == nothing).all()
+    _, p = mat.evaluate_lobe(s.materials, s.space, v, x.lobe_in, s.space.to_local(v.n, w))
+    assert (p[nothing] > 0).any()
 
 
 # ---------------------------------------------------------------- retraced proposals
