@@ -312,6 +312,14 @@ def test_dark_columns_are_left_alone() -> None:
         assert np.array_equal(x_new.u[:, dark], X.x.u[:, dark])
 
 
+def test_null_samples_with_light_cost_no_ray() -> None:
+    """W = 0 with a path that is lit: it would be rejected all the same."""
+    of = TwoRays(tracer("ajar"), STEP)
+    X, here = reused(of, 2, seed=1)
+    assert len(of.standing(X, here.index).columns) > 20
+    assert len(of.standing(replace(X, W=0 * X.W), here.index).columns) == 0
+
+
 @pytest.mark.parametrize("of", [TwoRays(tracer("ajar"), STEP, jumped), Retraced(tracer("ajar"))], ids=["two", "all"])
 def test_how_many_numbers_are_drawn_tells_nothing_of_the_samples(of) -> None:
     X, here = reused(of, 2, seed=1)
