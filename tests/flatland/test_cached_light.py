@@ -14,7 +14,7 @@ import pytest
 from figures.claims.criteria import all_unbiased, biased, mean_and_blocks
 from flatland2d import PLANE, SCENES, Pinhole
 from flatland2d.scenes import LAMP, chain, matte
-from restir_ref.batch import Array, ratio
+from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import random_in_row
@@ -328,6 +328,22 @@ def test_the_residual_reuses_the_ray_among_the_candidates() -> None:
     np.testing.assert_array_equal(over, (at.G > 1) & (frame.found.mW > 0))
     expected = at.f / at.p * (1 - 1 / at.G)
     np.testing.assert_allclose(frame.found.rest[:, over], expected[:, over], rtol=1e-9)
+
+
+@pytest.mark.parametrize("scene", ["crease", "glossy_cornell"])
+def test_a_point_sends_from_its_own_side_by_the_cosines_of_both_ends_over_the_distance(scene) -> None:
+    """G = |cos_1| |cos_y| / r^(d-1), without which the bound would be another's; seen from behind, nothing."""
+    here = lighted(scene, 16)
+    x, v = drawn(here, Live(np.random.default_rng(1))).found.x, take(here.of.v, here.index)
+    at, behind = (connection(here.of, here.index, each) for each in (x, replace(x, n=-x.n)))
+    to = x.y - v.x
+    r = np.sqrt((to**2).sum(axis=0))
+    cos_1, cos_y = abs((v.n * to).sum(axis=0)) / r, -(x.n * to).sum(axis=0) / r
+    sent = at.f.any(axis=0)
+    assert sent.mean() > 0.5
+    np.testing.assert_allclose(at.G[sent], (cos_1 * cos_y / r)[sent], rtol=1e-9)
+    assert not behind.f[:, sent].any()
+    assert not behind.G[sent].any()
 
 
 # ---------------------------------------------------------------- bad input

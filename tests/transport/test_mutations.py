@@ -312,6 +312,16 @@ def test_dark_columns_are_left_alone() -> None:
         assert np.array_equal(x_new.u[:, dark], X.x.u[:, dark])
 
 
+def test_where_light_sampling_ends_behind_x_c_no_number_changes() -> None:
+    """x_(c+1) sends by the light's numbers: no lobe was chosen there, and those of x_c follow from elsewhere."""
+    m = moved("glossy_cornell", "numbers", "kept")
+    by_light = m.x.nee & (m.x.c + 1 == m.x.k)
+    assert by_light.sum() > 10
+    assert np.array_equal(m.x_new.u[:, by_light], m.x.u[:, by_light])
+    by_lobe = (m.x.c < m.x.k) & ~by_light
+    assert (m.x_new.u != m.x.u)[:, by_lobe].any()
+
+
 def test_null_samples_with_light_cost_no_ray() -> None:
     """W = 0 with a path that is lit: it would be rejected all the same."""
     of = TwoRays(tracer("ajar"), STEP)
