@@ -346,6 +346,20 @@ def test_a_point_sends_from_its_own_side_by_the_cosines_of_both_ends_over_the_di
     assert not behind.G[sent].any()
 
 
+def test_a_frame_is_as_bright_as_the_throughput_that_arrives_at_x_1() -> None:
+    """Of one x_1 all candidates scale alike, so that the same are selected."""
+    here = lighted("crease", 16, 4.0)
+    T = np.random.default_rng(2).uniform(0.25, 4, here.of.T.shape)
+    there = Pixels(replace(here.of, T=T * here.of.T), here.index)
+    frames = [drawn(each, Live(np.random.default_rng(1))) for each in (here, there)]
+    one, other = (
+        shown(h, frame, Live(np.random.default_rng(3))) for h, frame in zip((here, there), frames, strict=True)
+    )
+    np.testing.assert_allclose(other, T * one, rtol=1e-9)
+    np.testing.assert_allclose(frames[1].found.rest, T * frames[0].found.rest, rtol=1e-9)
+    assert ((frames[0].X.W > 0) & (one > 0).any(axis=0)).mean() > 0.5
+
+
 # ---------------------------------------------------------------- bad input
 
 
