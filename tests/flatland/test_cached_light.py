@@ -319,8 +319,9 @@ def test_a_frame_that_looks_at_once_asks_for_every_candidate_that_would_send_lig
 
 
 @pytest.mark.claims("DDGIR-F02", part="one ray for both")
-def test_the_residual_reuses_the_ray_among_the_candidates() -> None:
-    here, chance = lighted("crease", 16, 1.0), Live(np.random.default_rng(1))
+@pytest.mark.parametrize("scene", ["crease", "glossy_cornell"])
+def test_the_residual_reuses_the_ray_among_the_candidates_weighed_by_all_lobes(scene) -> None:
+    here, chance = lighted(scene, 16, 1.0), Live(np.random.default_rng(1))
     frame = drawn(here, chance)
     np.testing.assert_array_equal(frame.found.x.y, frame.found.ray.z.x)
     at = connection(here.of, here.index, frame.found.x)
