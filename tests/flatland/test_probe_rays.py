@@ -70,6 +70,19 @@ def test_the_irradiance_of_what_is_constant_around_rays_is_exact() -> None:
     assert irradiance(rays, x, normal)[0, 0] == pytest.approx(by_hand, rel=5e-3)
 
 
+def test_rays_bring_what_lamps_emit_and_nothing_from_where_nothing_is() -> None:
+    """Below the lamp a ray meets it; outside of the room most meet nothing, where the field would have an answer."""
+    here = lighted("crease", 1)
+    s, place = here.of.scene, np.array([[0.5, 9.0], [0.5, 9.0]])
+    L = brought(here.of.cache, place, Sectors(64), Live(np.random.default_rng(1))).L[0]
+    met = np.isfinite(s.intersect(np.repeat(place, 64, axis=1), np.tile(Sectors(64).w, 2))[0]).reshape(2, 64)
+    assert met[0].all()
+    assert 0 < met[1].sum() < 32
+    assert (L[1][~met[1]] == 0).all()
+    assert L[0].max() > s.emission.max()
+    assert np.median(L[0]) < s.emission.max() / 2
+
+
 def test_fewer_than_two_sectors_are_refused() -> None:
     with pytest.raises(ValueError, match=r"number of sectors .* 1"):
         Sectors(1)

@@ -77,6 +77,38 @@ def test_with_a_small_threshold_every_path_ends_at_x_2(space) -> None:
     assert L.mean() == pytest.approx(followed(space, [GLOSS], plain)[0].mean(), rel=0.1)
 
 
+@pytest.mark.claims("DDGIR-E08", part="in footprints of its own pixel")
+@pytest.mark.parametrize("space", SEEING)
+def test_a_path_has_spread_in_footprints_of_its_own_pixel(space) -> None:
+    """One threshold: behind small pixels no path goes on, behind large ones nearly all do."""
+    asked = Counter[str]()
+    c, at = arriving(SPACES[space], [GLOSS], 1000, asked)
+    small = np.arange(1000) % 4 == 0
+    recursive(1.0, 2)(c, replace(at, a0=np.where(small, 1e-9, 1e9)), Live(np.random.default_rng(1)))
+    assert 600 < asked[CLOSEST] <= 750
+    asked.clear()
+    recursive(1.0, 2)(c, replace(at, a0=np.full(1000, 1e-9)), Live(np.random.default_rng(1)))
+    assert asked[CLOSEST] == 0
+
+
+@pytest.mark.parametrize("space", SEEING)
+def test_a_path_that_goes_on_and_meets_nothing_brings_nothing(space) -> None:
+    """One wall that mirrors and shines, and no room around it."""
+    c, at = arriving(SPACES[space], [Layer("mirror", (0.6,))], 100, Counter())
+    alone = scene(SPACES[space], [Material([Layer("mirror", (0.6,))])], list(walls(SPACES[space].d, 0, (1.0,)))[:1])
+    chance = Live(np.random.default_rng(1))
+    assert (recursive(np.inf, 3)(c, at, chance) > 0).all()
+    assert (recursive(np.inf, 3)(replace(c, scene=alone), at, chance) == 0).all()
+
+
+def test_a_cache_that_counts_elsewhere_counts_no_longer_where_it_did() -> None:
+    before, now = Counter[str](), Counter[str]()
+    c, at = arriving(SPACES["plane"], [MATTE], 5, before)
+    sent(counted(c, now), at, plain, Live(np.random.default_rng(1)))
+    assert now[QUERIES] == 5
+    assert not before
+
+
 @pytest.mark.claims("DDGIR-A05", part="without bias where the cache has none")
 @pytest.mark.parametrize("threshold", [1e-6, 1.0, np.inf])
 @pytest.mark.parametrize("space", SPACES)
