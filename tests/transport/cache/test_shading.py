@@ -9,20 +9,23 @@ import pytest
 
 from figures.claims.criteria import unbiased
 from flatland2d.scenes import cornell
-from restir_ref.batch import Array
+from restir_ref.batch import Array, take
 from restir_ref.chance import Live
+from restir_ref.integrals import Pixels
+from restir_ref.transport import materials as mat
+from restir_ref.transport.cache import shading as module
 from restir_ref.transport.cache.footprint import as_wide_as_in_space
 from restir_ref.transport.cache.integrals import by_ray
 from restir_ref.transport.cache.leaving import Cache, diffuse
 from restir_ref.transport.cache.queries import QUERIES, counted
-from restir_ref.transport.cache.shading import Arrival, Shading, plain, recursive, residual, sent
+from restir_ref.transport.cache.shading import Arrival, Shading, bounded, plain, recursive, residual, sent
 from restir_ref.transport.counting import CLOSEST, rays
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, Tracer
 from restir_ref.transport.scene import scene
 from restir_ref.transport.space import Space
 from tests.transport.cache.fields import Smooth, Uniform, asking
-from tests.transport.cache.gathered import at_centres
+from tests.transport.cache.gathered import at_centres, drawn
 from tests.transport.rooms import walls
 from tests.transport.spaces import SEEING, SPACES
 
@@ -89,6 +92,32 @@ def test_a_path_has_spread_in_footprints_of_its_own_pixel(space) -> None:
     asked.clear()
     recursive(1.0, 2)(c, replace(at, a0=np.full(1000, 1e-9)), Live(np.random.default_rng(1)))
     assert asked[CLOSEST] == 0
+
+
+@pytest.mark.parametrize(("threshold", "segments"), [(0.5, 0), (1.5, 1), (2.5, 2), (3.5, 3)])
+def test_lengths_of_segments_add(monkeypatch, threshold, segments) -> None:
+    """Each widens the path by a length of 1: it ends behind the first sum above the threshold."""
+    monkeypatch.setattr(module, "widening", lambda r, p, cos, d: np.ones(len(r)))
+    asked = Counter[str]()
+    c, at = arriving(SPACES["plane"], [Layer("mirror", (0.6,))], 10, asked)
+    recursive(threshold)(c, replace(at, a0=np.ones(10)), Live(np.random.default_rng(1)))
+    assert asked[CLOSEST] == 10 * segments
+
+
+def test_an_arrival_is_that_of_its_own_columns_in_directions() -> None:
+    """The footprint of each column's pixel, and for a selected point the density of its direction, of all lobes."""
+    place, seen = cornell(0.3), []
+    t = Tracer(place.scene, replace(place.pinhole(32, 0), film=32), 1, RECONNECTION)
+    here, chance = at_centres(t, Cache(t.scene, Smooth(2)), 8), Live(np.random.default_rng(3))
+    some = np.random.default_rng(4).permutation(len(here.index))[:50]
+    X = drawn(here, chance).X
+    bounded(take(X, some), Pixels(here.of, some), lambda c, at, chance: seen.append(at) or at.r[None], chance)
+    v, to = take(here.of.v, some), X.x.y[:, some] - here.of.v.x[:, some]
+    w = to / np.sqrt((to**2).sum(axis=0))
+    s = place.scene
+    _, p = mat.evaluate_all(s.materials, s.space, v, mat.lobe_shares(s.materials, v), s.space.to_local(v.n, w))
+    np.testing.assert_allclose(seen[0].p, p, rtol=1e-12)
+    np.testing.assert_allclose(seen[0].a0, here.of.r[some] / (2 * np.pi * v.o[-1]), rtol=1e-12)
 
 
 @pytest.mark.parametrize("space", SEEING)
