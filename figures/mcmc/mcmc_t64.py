@@ -73,7 +73,7 @@ def check(a: Arrays) -> list[Claim]:
         ratio(a, "MCMC-T1", (FIVE, NONE, "error"), 1.03, "64 pixels: RMSE 5 / 0"),
         replace(
             ratio(a, "MCMC-C03", (FIVE, AFTER, "covariance"), 0.95, "64 pixels: covariance between / after"),
-            reason=EITHER_WAY,
+            reason=f"{open_by(a)}  {EITHER_WAY}",
         ),
     ]
     correlated = ", ".join(f"{a[f'{arm}.correlation'][0]:.3f} ({NAMES[arm]})" for arm in (NONE, FIVE))
@@ -81,7 +81,9 @@ def check(a: Arrays) -> list[Claim]:
     for k in KS:
         both = [criteria.ratio_below(a[f"{k}.{what}"], a[f"{NONE}.{what}"], 1.03) for what in ("error", "covariance")]
         counter = criteria.ratio_above(a[f"{k}.error"], a[f"{NONE}.error"], 1.03)
-        claims.append(judged(a, Claim("MCMC-C01", criteria.all_of(*both), f"64 pixels: {k} / 0", counter)))
+        falls = criteria.ratio_below(a[f"{k}.error"], a[f"{NONE}.error"], 1).passed
+        claim = Claim("MCMC-C01", criteria.all_of(*both), f"64 pixels: {k} / 0", counter, caveat=FALLS if falls else "")
+        claims.append(judged(a, claim))
     interval = criteria.ratio_interval(a[f"{BLUE}.covariance"], a[f"{FIVE}.covariance"])[2]
     claims.append(Claim("MCMC-T2b", criteria.reported(interval), "64 pixels: covariance, blue / plain"))
     for arm in (NONE, FIVE, BLUE):
@@ -89,6 +91,15 @@ def check(a: Arrays) -> list[Claim]:
         red, blue = criteria.ratio_above(low, np.ones_like(low), 1), criteria.ratio_below(low, np.ones_like(low), 1)
         claims.append(judged(a, Claim("MCMC-F08", red, f"64 pixels, {NAMES[arm]}: low-frequency ratio", blue)))
     return claims
+
+
+FALLS = "the error does not stay, as the sentence has it: it falls, because reuse alone keeps few distinct samples"
+
+
+def open_by(a: Arrays) -> str:
+    """What so many images can tell of mutations between the passes and after both."""
+    low, high, _ = criteria.ratio_interval(a[f"{FIVE}.covariance"], a[f"{AFTER}.covariance"])
+    return f"{len(a[f'{FIVE}.covariance'])} images leave {(high - low) / 2:.2f} of the ratio open."
 
 
 EITHER_WAY = (
@@ -144,7 +155,7 @@ FIGURE = Figure(
     source="[MCMC Tab. 1, Tab. 2, Fig. 8; 3.2.2, 3.2.4, 6.3]",
     claims=("MCMC-T1", "MCMC-T2", "MCMC-T2b", "MCMC-C01", "MCMC-C03", "MCMC-F08"),
     arm="arm",
-    presets={"quick": {"frames": 20, "replicas": 60}, "paper": {"frames": FRAMES, "replicas": 1000}},
+    presets={"quick": {"frames": 20, "replicas": 60}, "paper": {"frames": FRAMES, "replicas": 8000}},
     chunks=chunks,
     compute=compute,
     combine=combine,

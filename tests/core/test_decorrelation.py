@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, ndtri
 
+from restir_ref import decorrelation as module
 from restir_ref.batch import Array, total
 from restir_ref.decorrelation import STEPS, Blue, Move, attempt, bounded, energy, gaussian, metropolis, mutate, wrapped
 from restir_ref.integrals import Pixels, Reservoirs
@@ -255,6 +256,15 @@ def test_blue_noise_mixes_the_annealed_acceptance_with_the_ratio_of_targets(w, T
     a_bn = np.where(e_new < e, 1, np.exp(-(e_new - e) / T))
     right = np.minimum(1, (w * a_bn + (1 - w) * of.p_hat_new / of.p_hat) * 0.5)
     assert noise(of) == pytest.approx(right, rel=1e-12)
+
+
+def test_the_rule_compares_with_what_pixels_show_before_the_mutations():
+    """The luminance p_hat W, not p_hat: uneven weights tell them apart."""
+    uneven, here = replace(X, W=np.random.default_rng(2).uniform(0.5, 2, 64)), Pixels(LINE, HERE.index)
+    found = module.blue(1.0, lambda here, chance: (LEFT, [1, 2]))(uneven, here, live(1))
+    assert found.luminance == pytest.approx(LINE.contribution(HERE.index, X.x)[0] * uneven.W, rel=1e-12)
+    assert abs(found.luminance / LINE.contribution(HERE.index, X.x)[0] - 1).max() > 0.3
+    assert (found.neighbours, found.distances, found.w) == (LEFT, [1, 2], 1.0)
 
 
 def test_the_temperature_is_a_hundredth_unless_told():

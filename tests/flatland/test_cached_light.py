@@ -14,7 +14,7 @@ import pytest
 from figures.claims.criteria import all_unbiased, biased, mean_and_blocks
 from flatland2d import PLANE, SCENES, Pinhole
 from flatland2d.scenes import LAMP, chain, matte
-from restir_ref.batch import Array, ratio
+from restir_ref.batch import Array, ratio, take
 from restir_ref.chance import Live
 from restir_ref.integrals import Pixels, Reservoirs
 from restir_ref.loop import random_in_row
@@ -32,7 +32,7 @@ from restir_ref.transport.cache.integrals import (
     radiance,
     unseen,
 )
-from restir_ref.transport.cache.leaving import Cache, never_lost
+from restir_ref.transport.cache.leaving import Cache, gloss, never_lost
 from restir_ref.transport.cache.queries import QUERIES, counted
 from restir_ref.transport.cache.shading import bounded, plain, residual
 from restir_ref.transport.counting import CLOSEST, SHADOW
@@ -206,6 +206,50 @@ def test_dividing_by_a_redrawn_value_is_biased() -> None:
     assert np.median(shiny_image(128, redrawn).mean(axis=1)) > 3 * shiny_truth().mean()
 
 
+def by_contributions(here: Pixels, chance: Live) -> Array:
+    """The image by `shade` alone: bounded light by f W (L_e + L+), the rest by the ray."""
+    frame = reused(here, chance, 3)
+    return replicated(shade(frame.X, here) + residual(here.of, here.index, frame.found, plain, chance))
+
+
+def test_contributions_ask_for_this_pixel_and_are_unbiased() -> None:
+    blocks, here = mean_and_blocks(shiny_truth(), 4), shiny(768)
+    found = by_contributions(here, Live(np.random.default_rng(1)))
+    assert all_unbiased(mean_and_blocks(found, 4), blocks, eps=0.02).passed
+
+
+@pytest.mark.claims("DDGIR-C03", part="control")
+def test_contributions_by_the_kept_value_are_biased(monkeypatch) -> None:
+    """The last block, which looks at the walls' bright side, gets 5 % too much; both ways see the same samples."""
+    here, right = shiny(768), mean_and_blocks(shiny_truth(), 4)[-1]
+    own = by_contributions(here, Live(np.random.default_rng(1)))
+    monkeypatch.setattr(CacheIntegrals, "contribution", lambda of, index, x: x.f * x.L)
+    off = by_contributions(here, Live(np.random.default_rng(1))) - own
+    assert biased(mean_and_blocks(off, 4)[:, -1] + right, right, 0.02, 1).passed
+
+
+@pytest.mark.parametrize("sampled", [gloss, never_lost])
+def test_a_lost_glossy_sample_steers_the_selection_and_carries_nothing(sampled) -> None:
+    """Where gloss is lost, `never_lost` asks along the mirror's direction: for targets, not for contributions."""
+    here, chance = shiny(64), Live(np.random.default_rng(1))
+    x = drawn(here, chance).X.x
+    at = connection(here.of, here.index, x)
+    asked_for = x.f * radiance(here.of.cache, x, at, sampled)
+    same = (here.of.contribution(here.index, x) == asked_for).all()
+    assert same == (sampled is gloss)
+    assert (x.f * asked(here.of, x, at) >= asked_for - 1e-12).all()
+
+
+def test_a_target_is_the_product_of_two_means_over_channels() -> None:
+    """Red light on a blue surface: no product is positive, and the target is; else weights would see the value."""
+    here = lighted("crease", 1)
+    x = drawn(here, Live(np.random.default_rng(1))).X.x
+    f, L = (np.repeat(np.eye(3)[:, k : k + 1], len(here.index), axis=1) for k in (0, 2))
+    found = here.of.target(here.index, replace(x, f=f, L=3 * L))
+    np.testing.assert_allclose(found, 1 / 3)
+    assert (f * L == 0).all()
+
+
 # ---------------------------------------------------------------- what it costs
 
 
@@ -275,8 +319,9 @@ def test_a_frame_that_looks_at_once_asks_for_every_candidate_that_would_send_lig
 
 
 @pytest.mark.claims("DDGIR-F02", part="one ray for both")
-def test_the_residual_reuses_the_ray_among_the_candidates() -> None:
-    here, chance = lighted("crease", 16, 1.0), Live(np.random.default_rng(1))
+@pytest.mark.parametrize("scene", ["crease", "glossy_cornell"])
+def test_the_residual_reuses_the_ray_among_the_candidates_weighed_by_all_lobes(scene) -> None:
+    here, chance = lighted(scene, 16, 1.0), Live(np.random.default_rng(1))
     frame = drawn(here, chance)
     np.testing.assert_array_equal(frame.found.x.y, frame.found.ray.z.x)
     at = connection(here.of, here.index, frame.found.x)
@@ -284,6 +329,36 @@ def test_the_residual_reuses_the_ray_among_the_candidates() -> None:
     np.testing.assert_array_equal(over, (at.G > 1) & (frame.found.mW > 0))
     expected = at.f / at.p * (1 - 1 / at.G)
     np.testing.assert_allclose(frame.found.rest[:, over], expected[:, over], rtol=1e-9)
+
+
+@pytest.mark.parametrize("scene", ["crease", "glossy_cornell"])
+def test_a_point_sends_from_its_own_side_by_the_cosines_of_both_ends_over_the_distance(scene) -> None:
+    """G = |cos_1| |cos_y| / r^(d-1), without which the bound would be another's; seen from behind, nothing."""
+    here = lighted(scene, 16)
+    x, v = drawn(here, Live(np.random.default_rng(1))).found.x, take(here.of.v, here.index)
+    at, behind = (connection(here.of, here.index, each) for each in (x, replace(x, n=-x.n)))
+    to = x.y - v.x
+    r = np.sqrt((to**2).sum(axis=0))
+    cos_1, cos_y = abs((v.n * to).sum(axis=0)) / r, -(x.n * to).sum(axis=0) / r
+    sent = at.f.any(axis=0)
+    assert sent.mean() > 0.5
+    np.testing.assert_allclose(at.G[sent], (cos_1 * cos_y / r)[sent], rtol=1e-9)
+    assert not behind.f[:, sent].any()
+    assert not behind.G[sent].any()
+
+
+def test_a_frame_is_as_bright_as_the_throughput_that_arrives_at_x_1() -> None:
+    """Of one x_1 all candidates scale alike, so that the same are selected."""
+    here = lighted("crease", 16, 4.0)
+    T = np.random.default_rng(2).uniform(0.25, 4, here.of.T.shape)
+    there = Pixels(replace(here.of, T=T * here.of.T), here.index)
+    frames = [drawn(each, Live(np.random.default_rng(1))) for each in (here, there)]
+    one, other = (
+        shown(h, frame, Live(np.random.default_rng(3))) for h, frame in zip((here, there), frames, strict=True)
+    )
+    np.testing.assert_allclose(other, T * one, rtol=1e-9)
+    np.testing.assert_allclose(frames[1].found.rest, T * frames[0].found.rest, rtol=1e-9)
+    assert ((frames[0].X.W > 0) & (one > 0).any(axis=0)).mean() > 0.5
 
 
 # ---------------------------------------------------------------- bad input

@@ -1,4 +1,4 @@
-"""The figures of GRIS on the line, small: claims hold, spoilt numbers do not pass, every axis says what it shows."""
+"""The figures on the line, small: claims hold, spoilt numbers do not pass, every axis says what it shows."""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -12,8 +12,10 @@ from figures.claims.ledger import load
 from figures.engine.jobs import stream
 from figures.experiments.exact import Loop
 from figures.gris import gris_c06, gris_f09, gris_f10
+from figures.mcmc import mcmc_f03
 from figures.project import Project
 from figures.report import legible, press, style
+from restir_ref.metrics import power_spectrum
 from tests.core.stubs import live
 from toy1d import quotient, two_pixels
 
@@ -158,3 +160,23 @@ def test_numbers_unlike_the_papers_do_not_pass_as_fig_9(name):
     assert verdicts(figure, synthetic()) == {"reproduced"}
     flat = spoilt(synthetic(), name, lambda a: 0.7 + 1e-3 * live().uniform(a.shape))
     assert verdicts(figure, flat) != {"reproduced"}
+
+
+# ---------------------------------------------------------------- what reuse makes of noise
+
+
+def shares(S: np.ndarray) -> np.ndarray:
+    """Of low frequencies, and the mean of all."""
+    return np.array([mcmc_f03.low_share(S), S[1:].mean()])
+
+
+def test_one_pass_over_equal_integrands_is_the_filter_of_its_weights():
+    """White rings, which need no swaps; with equal weights of all four samples it would be another filter."""
+    rng = np.random.default_rng(1)
+    before, after = (power_spectrum(e - 1).mean(axis=0) for e in mcmc_f03.reused(rng.random((800, 128)), rng))
+    right = shares(mcmc_f03.filtered(before, mcmc_f03.RADIUS))
+    s = np.arange(1, mcmc_f03.RADIUS + 1)
+    h = np.cos(2 * np.pi * np.outer(np.fft.fftfreq(128), s)).mean(axis=1)
+    equal = shares(before * ((1 + 3 * h) / 4) ** 2 + 3 / 16 * (before * (1 - h**2)).mean())
+    assert abs(shares(after) / right - 1).max() < 0.03
+    assert abs(shares(after) / equal - 1).max() > 0.06

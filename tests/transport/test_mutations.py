@@ -14,6 +14,7 @@ from restir_ref.batch import Array, changed, take
 from restir_ref.chance import Live
 from restir_ref.decorrelation import STEPS, mutations
 from restir_ref.integrals import Pixels
+from restir_ref.transport import materials as mat
 from restir_ref.transport import mutations as module
 from restir_ref.transport.counting import counted, rays
 from restir_ref.transport.mutations import (
@@ -31,6 +32,7 @@ from restir_ref.transport.paths import RECONNECTION, Tracer
 from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.transport.retracing import inside, traced
 from restir_ref.transport.shifts import shift_path
+from restir_ref.transport.vectors import normalize
 from tests.transport.furnished import FURNISHED, furnished_shifts
 from tests.transport.mutated import (
     PIXELS,
@@ -260,6 +262,22 @@ def test_proposals_that_would_are_noticed(monkeypatch) -> None:
     assert (J == 0).mean() > 0.01  # not even the shift to its own pixel is defined
 
 
+def test_numbers_of_which_the_lobe_samples_nothing_are_no_mutation() -> None:
+    """The view's direction stands in for the one that is not there, and the lobe could have sampled that."""
+    of = TwoRays(tracer("glossy_cornell"), STEP)
+    X, here = reused(of, 6, seed=1)
+    there, s = of.standing(X, here.index), of.tracer.scene
+    x, v = take(X.x, there.columns), there.at.v
+    u = np.resize([1e-6, 1 - 1e-6], (1, len(there.columns)))  # at the horizons of the visible normals
+    turn = ByNumbers(0.1, lambda old, sigma, chance: (u, np.ones(u.shape[-1])))
+    w, T = turn(of.tracer, v, x.lobe_in, normalize(x.z - v.x), Live(np.random.default_rng(4)))
+    nothing = mat.sample_lobe(s.materials, s.space, v, x.lobe_in, u)[-1] == 0
+    assert nothing.sum() > 5
+    assert ((T == 0) == nothing).all()
+    _, p = mat.evaluate_lobe(s.materials, s.space, v, x.lobe_in, s.space.to_local(v.n, w))
+    assert (p[nothing] > 0).any()
+
+
 # ---------------------------------------------------------------- retraced proposals
 
 
@@ -292,6 +310,24 @@ def test_dark_columns_are_left_alone() -> None:
         assert dark.sum() > 20
         assert (T[dark] == 0).all()
         assert np.array_equal(x_new.u[:, dark], X.x.u[:, dark])
+
+
+def test_where_light_sampling_ends_behind_x_c_no_number_changes() -> None:
+    """x_(c+1) sends by the light's numbers: no lobe was chosen there, and those of x_c follow from elsewhere."""
+    m = moved("glossy_cornell", "numbers", "kept")
+    by_light = m.x.nee & (m.x.c + 1 == m.x.k)
+    assert by_light.sum() > 10
+    assert np.array_equal(m.x_new.u[:, by_light], m.x.u[:, by_light])
+    by_lobe = (m.x.c < m.x.k) & ~by_light
+    assert (m.x_new.u != m.x.u)[:, by_lobe].any()
+
+
+def test_null_samples_with_light_cost_no_ray() -> None:
+    """W = 0 with a path that is lit: it would be rejected all the same."""
+    of = TwoRays(tracer("ajar"), STEP)
+    X, here = reused(of, 2, seed=1)
+    assert len(of.standing(X, here.index).columns) > 20
+    assert len(of.standing(replace(X, W=0 * X.W), here.index).columns) == 0
 
 
 @pytest.mark.parametrize("of", [TwoRays(tracer("ajar"), STEP, jumped), Retraced(tracer("ajar"))], ids=["two", "all"])

@@ -7,9 +7,11 @@ import pytest
 
 from flatland2d.directions import MAPS
 from flatland2d.probe_rooms import open_room, probes
+from restir_ref.transport.cache import converge as module
 from restir_ref.transport.cache.converge import converge, noise_of
 from restir_ref.transport.cache.update import Updating, update
 from restir_ref.transport.cache.volume import unlit
+from restir_ref.transport.materials import albedo
 from restir_ref.transport.space import ball_volume
 from tests.transport.cache.worlds import WORLDS, live, volume
 from tests.transport.rooms import room
@@ -45,12 +47,28 @@ def test_volumes_that_are_made_anew_differ_by_the_tolerance():
     assert 0.25 < (one - other).std() / one.mean() / (np.sqrt(2) * tolerance) < 2
 
 
-def test_noise_is_that_of_a_blend_of_independent_frames():
-    """a E + (1 - a) E_new, iterated, has the variance (1 - a) / (1 + a) of E_new's."""
-    rng, a, E = np.random.default_rng(1), 0.8, np.ones(20_000)
+def test_the_hysteresis_rises_like_s_over_s_plus_g(monkeypatch):
+    """a = 0 for as many updates as light needs bounces, rho^n <= tolerance; a_s = s / (s + g), g = 1 / (1 - rho)."""
+    seen = []
+    monkeypatch.setattr(
+        module, "update", lambda v, s, how, chance: seen.append(how.hysteresis) or update(v, s, how, chance)
+    )
+    s, tolerance = open_room().scene, 0.02
+    rho = float(albedo(s.materials).max())
+    converge(unlit(s, probes(open_room(), 3), MAPS), s, replace(FURNACE, rays=16), live(1), tolerance=tolerance)
+    bounces = int(np.ceil(np.log(tolerance) / np.log(rho)))
+    later = np.maximum(np.arange(1, len(seen) + 1) - bounces, 0)
+    np.testing.assert_allclose(seen, later / (later + 1 / (1 - rho)))
+    assert later.max() > 3
+
+
+@pytest.mark.parametrize("a", [0.2, 0.8])
+def test_noise_is_that_of_a_blend_of_independent_frames_and_of_what_it_differs_from(a):
+    """a E + (1 - a) E_new, iterated, has the variance (1 - a) / (1 + a) of E_new's, E_new - E that of both."""
+    rng, E = np.random.default_rng(1), np.ones(20_000)
     for _ in range(60):
         before, E = E, a * E + (1 - a) * rng.normal(1, 0.3, E.size)
-    assert noise_of(before, E, a) == pytest.approx(E.std(), rel=0.15)
+    assert noise_of(before, E, a) == pytest.approx(E.std() * np.sqrt(2 / (1 + a)), rel=0.03)
     assert noise_of(0 * E, 0 * E, a) == 0
 
 

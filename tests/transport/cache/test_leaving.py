@@ -181,6 +181,9 @@ def test_what_selection_asks_is_what_shading_asks_unless_a_lobe_has_no_direction
     np.testing.assert_array_equal(L[:, ~lost], guess[:, ~lost])
     assert (L[:, lost] == 0).all()
     assert (guess > 0).all()
+    o = c.scene.space.to_world(v.n, v.o)
+    by_mirror = 2 * (v.n * o).sum(axis=0) * v.n - o
+    np.testing.assert_allclose(never_lost(c, v, u).w[:, lost], by_mirror[:, lost], atol=1e-12)
 
 
 def test_queries_are_displaced_and_what_is_transmitted_is_asked_on_the_other_side() -> None:

@@ -9,20 +9,23 @@ import pytest
 
 from figures.claims.criteria import unbiased
 from flatland2d.scenes import cornell
-from restir_ref.batch import Array
+from restir_ref.batch import Array, take
 from restir_ref.chance import Live
+from restir_ref.integrals import Pixels
+from restir_ref.transport import materials as mat
+from restir_ref.transport.cache import shading as module
 from restir_ref.transport.cache.footprint import as_wide_as_in_space
 from restir_ref.transport.cache.integrals import by_ray
 from restir_ref.transport.cache.leaving import Cache, diffuse
 from restir_ref.transport.cache.queries import QUERIES, counted
-from restir_ref.transport.cache.shading import Arrival, Shading, plain, recursive, residual, sent
+from restir_ref.transport.cache.shading import Arrival, Shading, bounded, plain, recursive, residual, sent
 from restir_ref.transport.counting import CLOSEST, rays
 from restir_ref.transport.materials import Layer, Material
 from restir_ref.transport.paths import RECONNECTION, Tracer
 from restir_ref.transport.scene import scene
 from restir_ref.transport.space import Space
 from tests.transport.cache.fields import Smooth, Uniform, asking
-from tests.transport.cache.gathered import at_centres
+from tests.transport.cache.gathered import at_centres, drawn
 from tests.transport.rooms import walls
 from tests.transport.spaces import SEEING, SPACES
 
@@ -75,6 +78,64 @@ def test_with_a_small_threshold_every_path_ends_at_x_2(space) -> None:
     L, asked = followed(space, [GLOSS], recursive(1e-6))
     assert asked[CLOSEST] == 0
     assert L.mean() == pytest.approx(followed(space, [GLOSS], plain)[0].mean(), rel=0.1)
+
+
+@pytest.mark.claims("DDGIR-E08", part="in footprints of its own pixel")
+@pytest.mark.parametrize("space", SEEING)
+def test_a_path_has_spread_in_footprints_of_its_own_pixel(space) -> None:
+    """One threshold: behind small pixels no path goes on, behind large ones nearly all do."""
+    asked = Counter[str]()
+    c, at = arriving(SPACES[space], [GLOSS], 1000, asked)
+    small = np.arange(1000) % 4 == 0
+    recursive(1.0, 2)(c, replace(at, a0=np.where(small, 1e-9, 1e9)), Live(np.random.default_rng(1)))
+    assert 600 < asked[CLOSEST] <= 750
+    asked.clear()
+    recursive(1.0, 2)(c, replace(at, a0=np.full(1000, 1e-9)), Live(np.random.default_rng(1)))
+    assert asked[CLOSEST] == 0
+
+
+@pytest.mark.parametrize(("threshold", "segments"), [(0.5, 0), (1.5, 1), (2.5, 2), (3.5, 3)])
+def test_lengths_of_segments_add(monkeypatch, threshold, segments) -> None:
+    """Each widens the path by a length of 1: it ends behind the first sum above the threshold."""
+    monkeypatch.setattr(module, "widening", lambda r, p, cos, d: np.ones(len(r)))
+    asked = Counter[str]()
+    c, at = arriving(SPACES["plane"], [Layer("mirror", (0.6,))], 10, asked)
+    recursive(threshold)(c, replace(at, a0=np.ones(10)), Live(np.random.default_rng(1)))
+    assert asked[CLOSEST] == 10 * segments
+
+
+def test_an_arrival_is_that_of_its_own_columns_in_directions() -> None:
+    """The footprint of each column's pixel, and for a selected point the density of its direction, of all lobes."""
+    place, seen = cornell(0.3), []
+    t = Tracer(place.scene, replace(place.pinhole(32, 0), film=32), 1, RECONNECTION)
+    here, chance = at_centres(t, Cache(t.scene, Smooth(2)), 8), Live(np.random.default_rng(3))
+    some = np.random.default_rng(4).permutation(len(here.index))[:50]
+    X = drawn(here, chance).X
+    bounded(take(X, some), Pixels(here.of, some), lambda c, at, chance: seen.append(at) or at.r[None], chance)
+    v, to = take(here.of.v, some), X.x.y[:, some] - here.of.v.x[:, some]
+    w = to / np.sqrt((to**2).sum(axis=0))
+    s = place.scene
+    _, p = mat.evaluate_all(s.materials, s.space, v, mat.lobe_shares(s.materials, v), s.space.to_local(v.n, w))
+    np.testing.assert_allclose(seen[0].p, p, rtol=1e-12)
+    np.testing.assert_allclose(seen[0].a0, here.of.r[some] / (2 * np.pi * v.o[-1]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("space", SEEING)
+def test_a_path_that_goes_on_and_meets_nothing_brings_nothing(space) -> None:
+    """One wall that mirrors and shines, and no room around it."""
+    c, at = arriving(SPACES[space], [Layer("mirror", (0.6,))], 100, Counter())
+    alone = scene(SPACES[space], [Material([Layer("mirror", (0.6,))])], list(walls(SPACES[space].d, 0, (1.0,)))[:1])
+    chance = Live(np.random.default_rng(1))
+    assert (recursive(np.inf, 3)(c, at, chance) > 0).all()
+    assert (recursive(np.inf, 3)(replace(c, scene=alone), at, chance) == 0).all()
+
+
+def test_a_cache_that_counts_elsewhere_counts_no_longer_where_it_did() -> None:
+    before, now = Counter[str](), Counter[str]()
+    c, at = arriving(SPACES["plane"], [MATTE], 5, before)
+    sent(counted(c, now), at, plain, Live(np.random.default_rng(1)))
+    assert now[QUERIES] == 5
+    assert not before
 
 
 @pytest.mark.claims("DDGIR-A05", part="without bias where the cache has none")

@@ -59,6 +59,17 @@ def test_a_frame_reads_the_volume_before_it_and_writes_another():
 
 
 @pytest.mark.parametrize("name", WORLDS)
+def test_a_probe_that_takes_no_part_learns_nothing(name):
+    s = room(WORLDS[name][0])
+    v = volume(name, s)
+    active = np.arange(v.grid.P) % 2 == 0
+    v = update(replace(v, active=active), s, FURNACE, live(1))
+    assert (v.E[:, active] > 0).all()
+    assert not v.E[:, ~active].any()
+    assert not v.r[:, ~active].any()
+
+
+@pytest.mark.parametrize("name", WORLDS)
 def test_the_first_frame_forgets_what_was_there(name):
     s = room(WORLDS[name][0])
     v = volume(name, s)
