@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 NONE, FIVE, BLUE, AFTER = "k = 0", "k = 5", "k = 5, blue", "k = 5, after spatial reuse"
 GLOSSY, FILM, SLIT, POSTS, CLOSED = VIEWS
 JUDGED = (GLOSSY, FILM, SLIT, POSTS)
-"""Views of Table 2; the door of Table 1 is more closed."""
+"""Views of every way to mutate.  Both tables are of one scene, whose door is more closed: `CLOSED`."""
 
 KS = ("k = 0", "k = 1", "k = 5", "k = 20")
 
@@ -91,21 +91,19 @@ QUICK = "Few images of short chains, or none: judged by the paper preset."
 
 def check(a: Arrays) -> list[Claim]:
     """Ratios with their intervals, view by view."""
-    claims = [fallen(a, view) for view in JUDGED]
+    claims = [fallen(a, view) for view in VIEWS]
     claims += [compared("MCMC-T1", pair(a, CLOSED, (FIVE, NONE), "error"), 1.03, f"{CLOSED}: RMSE 5 / 0")]
     claims += [driven(a, view, k) for view in JUDGED for k in KS[1:]]
     claims += [like_plain(a, view) for view in JUDGED]
-    claims += [
-        compared(
-            "MCMC-C03",
-            pair(a, view, (FIVE, AFTER), "covariance"),
-            0.95,
-            f"{view}: covariance between / after",
-            EITHER_WAY,
-        )
-        for view in (FILM, SLIT)
-    ]
+    claims += [either_way(a, view) for view in (FILM, SLIT)]
     return [*claims, *(less_behind_the_slit(a, view) for view in (FILM, SLIT))]
+
+
+def either_way(a: Arrays, view: str) -> Claim:
+    """Mutations between the passes decorrelate better than after both."""
+    found = pair(a, view, (FIVE, AFTER), "covariance")
+    reason = "" if found is None else f"{power(*found)}  {EITHER_WAY}"
+    return compared("MCMC-C03", found, 0.95, f"{view}: covariance between / after", reason)
 
 
 def fallen(a: Arrays, view: str) -> Claim:
@@ -131,9 +129,9 @@ def driven(a: Arrays, view: str, k: str) -> Claim:
     if error is None or covariance is None:
         return Claim("MCMC-C01", None, part, reason=QUICK)
     outcome = criteria.all_of(*(criteria.ratio_below(*each, 1.03) for each in (error, covariance)))
-    return Claim(
-        "MCMC-C01", outcome, part, criteria.ratio_above(*error, 1.03), reason="" if outcome.passed else NO_RISE
-    )
+    falls = FALLS if criteria.ratio_below(*error, 1).passed else ""
+    counter, reason = criteria.ratio_above(*error, 1.03), "" if outcome.passed else NO_RISE
+    return Claim("MCMC-C01", outcome, part, counter, caveat=falls, reason=reason)
 
 
 def like_plain(a: Arrays, view: str) -> Claim:
@@ -162,6 +160,7 @@ def less_behind_the_slit(a: Arrays, view: str) -> Claim:
 OVERLAP = "Fewer proposals are accepted behind the slit, and the covariance falls less, but the intervals overlap."
 
 
+FALLS = "the error does not stay, as the sentence has it: it falls, because reuse alone keeps few distinct samples"
 NO_RISE = "No certain increase, but so many images cannot exclude one of 3%."
 EITHER_WAY = (
     "Our explanation: what is mutated after spatial reuse is what the next frame reuses in time, so that samples "
@@ -259,7 +258,7 @@ FIGURE = Figure(
             "replicas": 32,
         },
         "paper": {
-            "arms": {GLOSSY: FEW, FILM: MANY, SLIT: MANY, POSTS: FEW, CLOSED: {NONE: 4, FIVE: 4}},
+            "arms": {GLOSSY: FEW, FILM: MANY, SLIT: MANY, POSTS: MANY, CLOSED: {NONE: 4, FIVE: 4}},
             "frames": FRAMES,
             "replicas": 100,
         },
