@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from restir_ref.batch import Array
-from restir_ref.transport.scene import Facet, Scene, scene
+from restir_ref.transport.scene import Ball, Facet, Scene, scene
 from restir_ref.transport.sheets import FLUSH, Sheets
 from tests.transport.rooms import MATTE, crossings, directions, room, soup
 from tests.transport.spaces import SPACES
@@ -22,10 +22,11 @@ WAYS = [(*three, *other) for three, other in product(permutations((0, 1, 2)), pe
 """Every order and side of its two triangles."""
 
 
-def made_of(triangles: Sequence[Array], lamps: int = 1) -> Scene:
-    """A scene of triangles (3, 3), the first of which emit."""
+def made_of(triangles: Sequence[Array], lamps: int = 1, balls: Sequence[Ball] = ()) -> Scene:
+    """A scene of triangles (3, 3), the first of which emit, and balls."""
     emission = [(1.0,)] * lamps + [()] * (len(triangles) - lamps)
-    return scene(SOLID, [MATTE], [Facet(v.tolist(), 0, shines) for v, shines in zip(triangles, emission, strict=True)])
+    facets = [Facet(v.tolist(), 0, shines) for v, shines in zip(triangles, emission, strict=True)]
+    return scene(SOLID, [MATTE], facets, balls)
 
 
 def halves(corners: Array, way: Sequence[int] = (0, 1, 2, 0, 2, 3)) -> list[Array]:
@@ -34,19 +35,19 @@ def halves(corners: Array, way: Sequence[int] = (0, 1, 2, 0, 2, 3)) -> list[Arra
 
 
 def flat_soup(seed: int) -> Scene:
-    """Random parallelograms, each in a random way, and as many triangles among them."""
+    """Random parallelograms, each in a random way, and as many triangles among them; balls if the seed is odd."""
     rng = np.random.default_rng(seed)
     found = []
     for _ in range(12):
         a, b, d = rng.random((3, 3))
         found += halves(np.stack([a, b, b + d - a, d]), WAYS[rng.integers(len(WAYS))])
         found.append(rng.random((3, 3)))
-    return made_of(found)
+    return made_of(found, balls=[Ball(rng.random(3).tolist(), 0.1) for _ in range(3 * (seed % 2))])
 
 
 def apiece(s: Scene) -> Scene:
     """The same scene, whose facets are asked one by one."""
-    sheets = Sheets(s.surfaces.maps, s.surfaces.offsets, 0, np.tile(np.arange(s.S), (2, 1)))
+    sheets = Sheets(s.surfaces.maps, s.surfaces.offsets, 0, np.tile(np.arange(s.S + s.radii.size), (2, 1)))
     return replace(s, surfaces=replace(s.surfaces, sheets=sheets))
 
 
@@ -66,7 +67,7 @@ def agree(a: Scene, b: Scene) -> bool:
     (t, prim), (t_b, prim_b) = a.intersect(x, w), b.intersect(x, w)
     met = np.isfinite(t)
     assert 0.2 < met.mean() < 0.98
-    assert len(np.unique(prim[met])) == a.S
+    assert len(np.unique(prim[met])) == a.S + a.radii.size
     same = (met == np.isfinite(t_b)) & (~met | (prim == prim_b))
     return bool(
         same.all() and np.allclose(t[met], t_b[met], rtol=1e-9) and (a.visible(x, x + w) == b.visible(x, x + w)).all()
@@ -172,8 +173,9 @@ def test_the_facet_met_is_the_one_that_linear_systems_find():
     t, prim = s.intersect(x, w)
     every = crossings(s, x, w)
     met = np.isfinite(t)
+    nearest = every.argmin(axis=0)
     assert (met == np.isfinite(every).any(axis=0)).all()
-    assert (every.argmin(axis=0) == prim)[met].all()
+    assert (np.where(nearest < s.S, nearest, s.S + (nearest - s.S) // 2) == prim)[met].all()
     np.testing.assert_allclose(t[met], every.min(axis=0)[met], rtol=1e-9)
 
 
