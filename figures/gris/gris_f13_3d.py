@@ -139,12 +139,13 @@ def check(a: Arrays) -> list[Claim]:
 
 def draw(a: Arrays) -> "Picture":
     """One frame of every renderer, scene by scene, and the errors of all frames."""
-    picture, axes = style.panels(1, 3, width=4.2, height=4.0)
+    picture, axes = style.panels(1, 4, width=3.2, height=4.0)
     for axis, scene in zip(axes[0], SCENES, strict=False):
         images = {TRUTH: a[f"{scene}.{TRUTH}"], **{name: a[f"{scene}.{name}"][0] for name in shown(scene)}}
         side = math.isqrt(len(images[TRUTH]))
         style.crops(axis, images, side=side, title=f"{scene}: one frame")
-    _frames(axes[0, 2], a)
+    for axis, scene in zip(axes[0, 2:], SCENES, strict=True):
+        _frames(axis, a, scene)
     return picture
 
 
@@ -153,15 +154,15 @@ def shown(scene: str) -> tuple[str, ...]:
     return (*SHIFTS, PT) if scene == SPACE.glass else SHIFTS
 
 
-def _frames(axis: "Axes", a: Arrays) -> None:
-    marks = dict(zip(SCENES, ("below glass", "distant"), strict=True))
-    for k, (scene, where) in enumerate(marks.items()):
-        for name in shown(scene):
-            found = np.sort(errors(a, scene, name))
-            look = style.look(name, label=f"{name}, {where}") | {"lw": 1 + k}
-            axis.plot(found, (np.arange(len(found)) + 0.5) / len(found), markevery=0.15, **look)
+def _frames(axis: "Axes", a: Arrays, scene: str) -> None:
+    of = {name: np.sort(errors(a, scene, name)) for name in shown(scene)}
+    every = np.log10(np.concatenate([*of.values()]))
+    for name, found in of.items():
+        axis.plot(found, (np.arange(len(found)) + 0.5) / len(found), markevery=0.15, **style.look(name, label=name))
     axis.set(xscale="log", xlabel="relMSE of the caustic, frame by frame", ylabel="share of frames below", ylim=(0, 1))
-    axis.set_title("Errors")
+    axis.set_xlim(10 ** np.floor(every.min()), 10 ** np.ceil(every.max()))
+    axis.minorticks_off()
+    axis.set_title(f"{scene}: errors")
     style.below(axis, ncols=2)
 
 

@@ -24,6 +24,8 @@ EFFORTS = {
     ("ajar", "view"): MOST,
     ("ajar_ceiling", "inset"): MOST,
     ("ajar_ceiling", "view"): MOST,
+    ("distant_caustic", "inset"): Effort(paths=150_000, jacobians=20),
+    ("distant_caustic", "view"): Effort(paths=400_000, jacobians=20),
 }
 """Where few paths carry light: fewer would leave the judge undecided, which is no acquittal."""
 
