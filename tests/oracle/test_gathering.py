@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -31,24 +32,15 @@ from tests.oracle.test_squares import (
     each_seed,
     four_pixels,
     group,
+    kept,
     largest,
     one_step,
     pair_frames,
     sheet,
 )
 
-
-def frames_of(scene: Scene, by: Array, shape=None):
-    """All frames of a scene, each after the one before it."""
-
-    def loop(index, chance):
-        X = initial(Pixels(scene.frames[0], index), chance)
-        for before, frame in zip(scene.frames[:-1], scene.frames[1:], strict=True):
-            here, there = Pixels(Carried(frame, by), index), Pixels(Squares(before, shape or (before.n,), by), index)
-            X = area_gathering(initial(Pixels(frame, index), chance), here, X, there, chance)
-        return X
-
-    return loop
+frames_of = partial(kept, reuse=area_gathering)
+"""All frames of a scene, each after the one before it, whose history gathers."""
 
 
 @pytest.mark.claims("GPT-A05", "COM-B05")

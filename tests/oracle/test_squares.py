@@ -27,7 +27,14 @@ HALF = np.array([[0.5, -0.5]])
 """Either pixel overlaps both: pixel 0 by halves of 0 and 1, pixel 1 of 0 and 1."""
 
 
-def kept(scene: Scene, by: Array, shape=None, past: type[Squares] = Squares, now: type[Carried] = Carried):
+def kept(
+    scene: Scene,
+    by: Array,
+    shape=None,
+    past: type[Squares] = Squares,
+    now: type[Carried] = Carried,
+    reuse=area_rejection,
+):
     """All frames of a scene, each after the one before it."""
 
     def loop(index, chance):
@@ -35,7 +42,7 @@ def kept(scene: Scene, by: Array, shape=None, past: type[Squares] = Squares, now
         for before, frame in zip(scene.frames[:-1], scene.frames[1:], strict=True):
             here = Pixels(now(frame, by), index)
             there = Pixels(past(before, shape or (before.n,), by), index)
-            X = area_rejection(initial(Pixels(frame, index), chance), here, X, there, chance)
+            X = reuse(initial(Pixels(frame, index), chance), here, X, there, chance)
         return X
 
     return loop
