@@ -128,6 +128,22 @@ class Paired:
     offset: Shifted
 
 
+def distinct_ends(ends: Array, n: int) -> None:
+    """Raise ValueError, naming the pair, unless ends (2, E) are two different ones of n pixels each."""
+    if ends.ndim != 2 or len(ends) != 2 or ends.dtype.kind not in "iu":
+        raise ValueError(
+            f"the ends of pairs have shape {ends.shape} and type {ends.dtype}, but are two rows of whole numbers: the "
+            f"pixels i, and the pixels j."
+        )
+    wrong = (ends < 0).any(axis=0) | (ends >= n).any(axis=0) | (ends[0] == ends[1])
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        raise ValueError(
+            f"pair {at} is of the pixels {ends[0, at]} and {ends[1, at]}, but a pair has two different ones of the {n} "
+            f"that there are, counted from 0."
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Pairs:
     """One part of the differences int f_i - int f_j of pairs (i, j).
@@ -136,6 +152,7 @@ class Pairs:
     are signed: an estimate adds up the shading of both signs, or is that of `MAGNITUDE` alone.
     The weight w* compares targets [GPT Eq. 13]; proxy=pdf compares sampling densities instead
     [GPT Eq. 4, as Eq. 16 has it], for candidates fresh from the samplers.
+    Raises ValueError for ends of another shape, for pixels that do not exist, and for a pair of a pixel and itself.
 
     >>> import numpy as np
     >>> from restir_ref import Live, Pixels, initial, shade
@@ -151,6 +168,9 @@ class Pairs:
     ends: Array
     part: Part
     proxy: Proxy = target
+
+    def __post_init__(self) -> None:
+        distinct_ends(self.ends, pixels(self.of))
 
     @property
     def n(self) -> int:

@@ -47,7 +47,7 @@ def parser() -> Parser:
     commands = root.add_subparsers(required=True, metavar="COMMAND")
     rendering = commands.add_parser("render", help="one scene by one method", description=RENDER)
     rendering.add_argument("--method", default="restir-pt", metavar="M", help=f"{', '.join(METHODS)} (%(default)s)")
-    rendering.add_argument("--frames", type=_count, default=16, metavar="N", help="frames in all (%(default)s)")
+    rendering.add_argument("--frames", type=_some, default=16, metavar="N", help="frames in all (%(default)s)")
     rendering.add_argument("--anew", action="store_true", help="drop what an earlier run has left at --out")
     _picture_options(rendering, Path("out/picture.png"))
     rendering.set_defaults(command=_render)
@@ -55,7 +55,7 @@ def parser() -> Parser:
     comparing.add_argument("--methods", default="path,restir-pt", metavar="M,M", help="default: %(default)s")
     comparing.add_argument("--rays", type=_positive, default=np.inf, metavar="R", help="rays per pixel for each method")
     comparing.add_argument("--seconds", type=_positive, default=np.inf, metavar="T", help="CPU time for each method")
-    comparing.add_argument("--trees", type=_count, default=256, metavar="N", help="of our own reference (%(default)s)")
+    comparing.add_argument("--trees", type=_some, default=256, metavar="N", help="of our own reference (%(default)s)")
     _picture_options(comparing, Path("out/compared.png"))
     comparing.set_defaults(command=_compare)
     listing = commands.add_parser("list", help="scenes and methods; with --out, a sheet of thumbnails")
@@ -70,7 +70,10 @@ RENDER = (
     "command goes on, with more --frames too. Ctrl-C keeps what is done. The picture of a still camera is the mean of "
     "its frames, that of a moving one its last."
 )
-COMPARE = "Gives every method the same rays or CPU time; prints a table, and draws pictures with maps of their errors."
+COMPARE = (
+    "Gives every method the same rays or CPU time; prints a table, and draws pictures with maps of their errors. The "
+    "camera stands: a moving one shows its last frame, which no budget makes better."
+)
 
 
 def _picture_options(command: Parser, out: Path) -> None:
@@ -134,7 +137,16 @@ def _render(options: argparse.Namespace) -> Callable[[], int]:
     files.check_out(options.out)
     begun = None if options.anew else files.load(options.out, job)
     R = _reference(options, job)
+    _check_camera(job, options.frames)
     return lambda: _run(job, options.frames, options.out, begun or blank(job), R)
+
+
+def _check_camera(job: Job, frames: int) -> None:
+    """Raise ValueError if a moving camera leaves its scene within so many frames."""
+    try:
+        job.sensor(frames - 1)
+    except ValueError as error:
+        raise ValueError(f"frame {frames} of the moving camera: {error} Ask for fewer --frames.") from error
 
 
 def _run(job: Job, frames: int, out: Path, begun: Picture, R: Array | None) -> int:
@@ -149,12 +161,15 @@ def _run(job: Job, frames: int, out: Path, begun: Picture, R: Array | None) -> i
                 bar.update()
         except KeyboardInterrupt:
             status = STOPPED
+        except ValueError as error:
+            print(f"tracer3d: error: frame {now.frames + 1}: {error}", file=sys.stderr)
+            status = 2
     if not now.frames:
         print("tracer3d: stopped before the first frame was done; nothing is kept", file=sys.stderr)
         return status
     files.save(out, job, now)
     done = f"{now.frames} of {frames} frames in {out.with_suffix('.png')}, linear in {files.linear(out)}"
-    print(f"{done}; the same command goes on from there" if status else done)
+    print(f"{done}; the same command goes on from there" if status == STOPPED else done)
     return status
 
 
@@ -162,6 +177,12 @@ def _run(job: Job, frames: int, out: Path, begun: Picture, R: Array | None) -> i
 
 
 def _compare(options: argparse.Namespace) -> Callable[[], int]:
+    if options.moving:
+        raise ValueError(
+            "a comparison needs a camera that stands: as many rays are not as many frames, so each method's picture of "
+            "a moving one would be of another view. Leave --moving out, or hold the last frames of `render --moving` "
+            "against one --reference."
+        )
     methods = options.methods.split(",")
     for method in methods:
         known(METHODS, method, "method")
@@ -179,7 +200,7 @@ def _compare(options: argparse.Namespace) -> Callable[[], int]:
 
 def _path_traced(job: Job, trees: int) -> Array:
     """A reference with random numbers of its own."""
-    by_path = replace(job, method="path", preset="realtime", moving=0.0, seed=job.seed + 1)
+    by_path = replace(job, method="path", preset="realtime", seed=job.seed + 1)
     *_, last = tqdm(
         render(by_path, _chances(job.seed + 1), trees, blank(by_path), job.compiled()),
         total=trees,
@@ -259,6 +280,12 @@ def _count(text: str) -> int:
     if not text.isascii() or not text.isdigit():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
     return int(text)
+
+
+def _some(text: str) -> int:
+    if not (value := _count(text)):
+        raise argparse.ArgumentTypeError(f"{text!r} is none: at least 1 is needed")
+    return value
 
 
 def _positive(text: str) -> float:

@@ -78,9 +78,12 @@ def path_tracing(shots: Iterable[Shot], preset: Preset, shape: Shape) -> Iterato
 
 def traced(t: Tracer, pixel: Array, chance: Chance) -> Array:
     """One path tree for each of `pixel` (N,), in blocks; (C, N)."""
-    parts = (pixel[at : at + BLOCK] for at in range(0, len(pixel), BLOCK))
-    found = [radiance(trace(t, chance.uniform((t.D, len(part))), part)) for part in parts]
-    return np.concatenate(found, axis=1)
+
+    def some(at: slice, chance: Chance) -> Array:
+        part = pixel[at]
+        return radiance(trace(t, chance.uniform((t.D, len(part))), part))
+
+    return over_windows(some, len(pixel), chance, BLOCK)
 
 
 def reuse_in_tiles(shots: Iterable[Shot], preset: Preset, shape: Shape) -> Iterator[Array]:

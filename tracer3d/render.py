@@ -31,6 +31,9 @@ RAY, BESIDE = 3e-8, 30
 MOST = 4 * 2**30
 """Bytes that a picture may need."""
 
+DEEPEST = 100
+"""Scattering vertices that a path may have: with lights to sample at each it is an image of nothing long before."""
+
 SURFACES = 10_000
 """So many triangles and spheres at most are asked by brute force."""
 
@@ -51,8 +54,8 @@ class Job:
     size   columns and rows;  crop  column and row of the film at which they begin, None for all of the view
     moving  steps of the camera per frame: a picture of a moving camera is its last frame, of a still one the mean
     intersect  who answers what rays meet, of `INTERSECT`
-    Raises ValueError for unknown names, a crop off the film, pictures that need too much memory, more surfaces than
-    brute force is for, and where Embree is asked for and not installed.
+    Raises ValueError for unknown names, a crop off the film, paths longer than DEEPEST, pictures that need too much
+    memory, more surfaces than brute force is for, and where Embree is asked for and not installed.
     """
 
     scene: str
@@ -74,6 +77,8 @@ class Job:
         known(INTERSECT, self.intersect, "way to intersect")
         for count in self.size:
             whole(count, 1, "each side of a picture", "Say --size 64x64.")
+        if self.depth is not None and self.depth > DEEPEST:
+            raise ValueError(f"the path depth is {self.depth}, more than {DEEPEST}: say --depth 4, or leave it out.")
         needed = self.size[0] * self.size[1] * self._bytes()
         if needed > MOST:
             raise ValueError(

@@ -1,5 +1,6 @@
 """Laws of differences: the proxy of both sides, reuse without selection over both signs, and pairs end by end."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -108,7 +109,24 @@ def test_pair_weights_compare_targets_unless_told():
 
 
 def test_pairs_are_as_many_as_they_have_ends():
-    assert [Pairs(three_pixel_scene().now, np.zeros((2, E), dtype=int), MAGNITUDE).n for E in (1, 3, 4)] == [1, 3, 4]
+    ends = [np.repeat([[0], [1]], E, axis=1) for E in (1, 3, 4)]
+    assert [Pairs(three_pixel_scene().now, each, MAGNITUDE).n for each in ends] == [1, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [
+        ([[0, 2], [1, 2]], "pair 1 is of the pixels 2 and 2, but a pair has two different ones of the 3"),
+        ([[0, 1], [1, 3]], "pair 1 is of the pixels 1 and 3"),
+        ([[-1, 0], [0, 1]], "pair 0 is of the pixels -1 and 0"),
+        ([[0, 1], [1, 2], [0, 2]], "have shape (3, 2)"),
+        ([0, 1], "have shape (2,)"),
+        ([[0.0], [1.0]], "type float64"),
+    ],
+)
+def test_ends_that_are_no_pairs_of_pixels_are_refused(ends, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        Pairs(three_pixel_scene().now, np.array(ends), MAGNITUDE)
 
 
 class Unmasked(Pairs):

@@ -121,6 +121,8 @@ MISTAKES = {
         "needs about 827.0 GiB, more than 4, and 1.2 hours a frame",
     ),
     "an absurd size by path": (["crease", "--method", "path", "--size", "20000x20000"], "about 74.5 GiB, more than 4"),
+    "a depth without end": (["crease", "--depth", "1000000"], "the path depth is 1000000, more than 100"),
+    "a camera that leaves": (["ajar", "--moving", "--frames", "99"], "frame 99 of the moving camera"),
     "a depth of 0": (["crease", "--depth", "0"], "the path depth must be a whole number >= 1, but is 0"),
     "tiles that do not fill it": (["crease", "--method", "path-reuse", "--size", "10x8"], "multiples of 4"),
     "a missing reference": (["crease", "--reference", "nowhere.pfm"], "nowhere.pfm"),
@@ -140,6 +142,7 @@ def test_a_mistake_is_named_and_nothing_is_written(tmp_path, capsys, words, said
         (["--size", "64"], "'64' is not a size, columns x rows, such as 64x48"),
         (["--crop", "a,b"], "'a,b' is not a column and a row"),
         (["--frames", "-1"], "'-1' is not a whole number"),
+        (["--frames", "0"], "'0' is none: at least 1 is needed"),
         (["--still", "--moving"], "not allowed with"),
     ],
 )
@@ -170,6 +173,20 @@ def test_a_reference_of_another_size_and_a_comparison_without_budget_are_refused
     assert "has 6 x 4 pixels, but the picture 8 x 8." in capsys.readouterr().err
     assert run("compare", "crease", *SMALL) == 2
     assert "say --rays 1000, or --seconds 10" in capsys.readouterr().err
+    assert run("compare", "crease", *SMALL, "--rays", "10", "--moving") == 2
+    assert "a comparison needs a camera that stands" in capsys.readouterr().err
+
+
+def test_a_frame_that_fails_leaves_those_before_it(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(cli, "_check_camera", lambda job, frames: None)
+    words = ["--method", "path", "--size", "8x8", "--depth", "1", "--moving"]
+    assert run("render", "ajar", *words, "--frames", "99", "--out", tmp_path / "a.png") == 2
+    said = capsys.readouterr()
+    done = int(said.out.split()[0])
+    assert 1 < done < 99
+    assert f"frame {done + 1}: " in said.err
+    assert run("render", "ajar", *words, "--frames", str(done), "--out", tmp_path / "b.png") == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_a_run_of_other_settings_is_not_overwritten(tmp_path, capsys):

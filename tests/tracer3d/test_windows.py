@@ -16,6 +16,7 @@ from restir_ref.transport.restir_pt import PathIntegrals
 from restir_ref.windows import windowed
 from tests.core.test_windows import OfItsOwn
 from tests.tracer3d.views import tracer
+from tracer3d import methods
 from tracer3d.methods import METHODS, Shot, around
 from tracer3d.render import Job
 
@@ -41,6 +42,12 @@ def test_pictures_are_the_same_bytes_in_windows_of_any_size(preset, moving):
 @pytest.mark.parametrize("method", ["path-reuse", "restir-di", "restir-gi"])
 def test_so_are_those_of_every_method_that_holds_frames(method):
     assert images(REAL_TIME, 100, 1.0, method) == images(REAL_TIME, WHOLE, 1.0, method)
+
+
+def test_paths_are_the_same_bytes_in_blocks_of_any_size(monkeypatch):
+    whole = images(REAL_TIME, WHOLE, method="path")
+    monkeypatch.setattr(methods, "BLOCK", 60)
+    assert images(REAL_TIME, WHOLE, method="path") == whole
 
 
 def test_a_window_with_random_numbers_of_its_own_is_noticed(monkeypatch):
