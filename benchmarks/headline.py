@@ -16,6 +16,8 @@ Mitsuba runs as `llvm_ad_rgb`, which needs LLVM 17 or newer (DRJIT_LIBLLVM_PATH 
 `scalar_rgb`, and the table says so.  Exits with 1 if a requirement is missed.
 """
 
+import figures  # noqa: F401  (BLAS gets one thread, which has to be said before NumPy loads)  # isort: skip
+
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
