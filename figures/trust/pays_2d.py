@@ -21,6 +21,7 @@ from restir_ref.loop import OFFLINE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure as Picture
 
 SCENES, RADII = ("cornell", "glossy_cornell", "ajar"), (6, 10, 30)
@@ -104,8 +105,6 @@ def pictured(
 
 def ratios(axis: "Axes", a: Arrays, scene: str, radii: Sequence[int]) -> None:
     """Variance after reuse over that without, predicted as a line, measured as marks; by radius."""
-    from matplotlib.ticker import LogLocator  # noqa: PLC0415  (drawing only)
-
     M = np.geomspace(TREES[0], TREES[-1], 50)
     for k, radius in enumerate(radii):
         s, name = of(a, scene, radius), f"{scene}.{radius}"
@@ -119,11 +118,18 @@ def ratios(axis: "Axes", a: Arrays, scene: str, radii: Sequence[int]) -> None:
     axis.axhline(1, color=style.INK, lw=1, ls="-", marker="", label="no gain, no loss")
     axis.set_xticks([], minor=True)
     axis.set_xticks(TREES, [str(M) for M in TREES])
-    axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.yaxis.set_major_formatter("{x:g}")
-    axis.yaxis.set_minor_formatter("")
+    in_halves(axis.yaxis)
     axis.set(xlabel="trees per pixel $M$", ylabel="variance with / without reuse", title=scene)
     style.below(axis, ncols=1)
+
+
+def in_halves(axis: "Axis") -> None:
+    """Ticks at 1, 2 and 5 times the powers of ten."""
+    from matplotlib.ticker import LogLocator  # noqa: PLC0415  (drawing only)
+
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")
 
 
 def scatter(axis: "Axes", found: Mapping[str, Sequence[tuple[Array, Array]]], known: str) -> None:
@@ -134,6 +140,8 @@ def scatter(axis: "Axes", found: Mapping[str, Sequence[tuple[Array, Array]]], kn
         axis.loglog(predicted, measured, **style.nth(k, ls="", label=scene, markersize=2.5), markevery=1)
         low, high = min(low, predicted.min(), measured.min()), max(high, predicted.max(), measured.max())
     axis.plot([low, high], [low, high], color=style.GREY, lw=1, ls="-", marker="", label="as predicted")
+    for each in (axis.xaxis, axis.yaxis):
+        in_halves(each)
     axis.set(xlabel=known, ylabel="gain measured", title=f"Tiles, {OFTEN} trees, one round")
     style.below(axis, ncols=1)
 
