@@ -91,7 +91,7 @@ OF_THEORY = {
     "gradient_loop.columns_of: ...{W => c})": AS_MANY,
     "gradient_loop.replaced: order[columns] = len(X.{W => c})...": AS_MANY,
     "gradient_loop.replaced: order = np.arange(len(X.{W => c}))": AS_MANY,
-    "gradient_loop.Group.__post_init__: ...{int(np.prod(self.shape) => np.prod(self.shape}):": WHOLE,
+    "gradient_loop.Group.__post_init__: size = {int(np.prod(self.shape) => np.prod(self.shape})": WHOLE,
     "gradient_loop.forward: ...{int(np.prod(shape) => np.prod(shape})...": WHOLE,
     "gradient_loop.in_space: ...[{here, *near => *near, here}]": "inputs in another order",
     "area.overlapped: by = by[:, index % by.shape[{- => }1]]": TABLE,

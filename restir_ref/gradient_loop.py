@@ -70,7 +70,7 @@ class Group:
     active  which (n,) reuse in space
     follow  how history follows the motion
 
-    Raises ValueError where these are not of as many pixels or pairs as the integrals.
+    Raises ValueError where these are not of as many pixels or pairs as the integrals, or of none.
     """
 
     of: Mapping[str, Film]
@@ -81,8 +81,10 @@ class Group:
     follow: Following = MOVED
 
     def __post_init__(self) -> None:
+        size = int(np.prod(self.shape))
         for part, of in self.of.items():
-            if not of.n == self.by.shape[-1] == len(self.active) or of.n % int(np.prod(self.shape)):
+            fits = of.n == self.by.shape[-1] == len(self.active) > 0 and size > 0 and of.n % size == 0
+            if not fits:
                 raise ValueError(
                     f"a group of {of.n} {part} integrals needs motion and activity of as many, and whole images: its "
                     f"shape is {tuple(self.shape)}, `by` has {self.by.shape[-1]} columns, `active` {len(self.active)}."
@@ -203,7 +205,13 @@ def forward(shape: Sequence[int], crops: int = 1) -> dict[str, tuple[Array, tupl
     """Ends (2, E) and shape of the pairs of every direction, "dx" along the last axis, "dy" along the first of two.
 
     A pair is (next pixel, this pixel), so that its difference I_i - I_j is the forward difference.
+    Raises ValueError where a direction has no pairs.
     """
+    if not shape or min(*shape, 2) < 2 or crops < 1:
+        raise ValueError(
+            f"{crops} images of shape {tuple(shape)} have a direction without neighbours, so no pairs: gradients need "
+            "2 pixels or more along every axis.  Give a single row as (n,), and render a single pixel without them."
+        )
     pixel = np.arange(crops * int(np.prod(shape))).reshape(crops, *shape)
     found = {"dx": (pixel[..., 1:], pixel[..., :-1])}
     if len(shape) == 2:

@@ -1,5 +1,6 @@
 """Area reservoirs and gradient frames, exactly: cells that have a place on the film.  [GPT 4.3.1, Fig. 2b]"""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -333,6 +334,22 @@ def test_groups_of_unequal_sizes_are_refused() -> None:
         Group({"primal": frame}, (3,), HALVES, ring, np.ones(2, dtype=bool))
 
 
+@pytest.mark.parametrize("shape", [(1,), (1, 1)], ids=str)
+def test_a_single_pixel_may_be_rendered_without_pairs(shape) -> None:
+    alone = Group({"primal": film_scene(0, 1).now}, shape, np.zeros((len(shape), 1)), ring, np.ones(1, dtype=bool))
+    X = step({"primal": alone}, Live(np.random.default_rng(1)), PRESET)["primal"]["primal"]
+    assert len(X.W) == 1
+
+
+@pytest.mark.parametrize("shape", [(0,), (0, 4), (4,)], ids=str)
+def test_a_group_of_nobody_is_refused(shape) -> None:
+    nobody = replace(film_scene(0).now, n=0)
+    with pytest.raises(ValueError, match="needs motion and activity of as many"):
+        Group({"primal": nobody}, shape, np.zeros((1, 0)), ring, np.ones(0, dtype=bool))
+    with pytest.raises(ValueError, match="needs motion and activity of as many"):
+        Group({"primal": film_scene(0).now}, (0,), HALVES, ring, np.ones(2, dtype=bool))
+
+
 def test_history_of_another_size_is_refused() -> None:
     small, large = (film_scene(0, n).now for n in (2, 4))
     there = Group({"primal": large}, (4,), np.zeros((1, 4)), ring, np.ones(4, dtype=bool))
@@ -341,7 +358,7 @@ def test_history_of_another_size_is_refused() -> None:
         in_time(group({"primal": small}), X, (there, X), PRESET.pixels, {"primal": ("primal",)}, Live(None))
 
 
-@pytest.mark.parametrize("shape", [(2, 3), (3, 2), (4, 5), (1, 4)])
+@pytest.mark.parametrize("shape", [(2, 2), (2, 3), (3, 2), (4, 5)])
 def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one(shape) -> None:
     (dx, shape_x), (dy, shape_y) = forward(shape).values()
     assert [*forward(shape)] == ["dx", "dy"]
@@ -353,6 +370,18 @@ def test_ends_of_forward_pairs_are_the_next_pixel_and_this_one(shape) -> None:
 def test_pairs_of_rows_and_of_several_crops_stay_inside_of_each() -> None:
     assert forward((4,))["dx"][0].tolist() == [[1, 2, 3], [0, 1, 2]]
     assert forward((2,), crops=2)["dx"][0].tolist() == [[1, 3], [0, 2]]
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 4), (4, 1), (0, 3), (1,), (0,), ()], ids=str)
+def test_an_image_without_neighbours_in_some_direction_has_no_pairs_and_is_refused(shape) -> None:
+    """A user who asks for gradients of one pixel would else get empty arrays, or a division by zero frames later."""
+    with pytest.raises(ValueError, match=rf"1 images of shape {re.escape(str(shape))} have a direction without"):
+        forward(shape)
+
+
+def test_pairs_of_no_images_are_refused() -> None:
+    with pytest.raises(ValueError, match="0 images of shape"):
+        forward((2, 2), crops=0)
 
 
 @pytest.mark.claims("GPT-A04")
