@@ -23,7 +23,7 @@ from figures.experiments.replicas import smaller
 from figures.gradient.gpt_f09 import error
 from figures.report import style
 from restir_ref.chance import Live
-from restir_ref.gradient_loop import GRADIENT, SAME_SIGN, UNSIGNED, Partners
+from restir_ref.gradient_loop import GRADIENT, SAME_SIGN, UNSIGNED, GradientPreset, Partners, View
 from restir_ref.transport.scene import scene
 from tracer3d.scenes import Setting, grey, matte
 from tracer3d.shapes import box, quad, rectangle, room
@@ -57,10 +57,15 @@ def chunks(preset: Any) -> Sequence[dict[str, Any]]:
 
 def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
     """The image and its differences, (replicas, n) each, and rays per pixel."""
-    s, asked = rack(), Counter[str]()
-    own = replace(GRADIENT, partners=ARMS[chunk["reuse"]])
-    views = views_of(s, followed(s, preset["side"], preset["frames"]), own, ADAPTIVE, asked)
-    return with_restir([in_place(view) for view in views], asked, preset["replicas"], Live(rng), own)
+    own, asked = replace(GRADIENT, partners=ARMS[chunk["reuse"]]), Counter[str]()
+    views = moving(preset["side"], preset["frames"], own, asked)
+    return with_restir(views, asked, preset["replicas"], Live(rng), own)
+
+
+def moving(side: int, frames: int, own: GradientPreset, asked: Counter[str]) -> list[View]:
+    """The frames of the moving camera, each after the one before, whose history stays where it is."""
+    s = rack()
+    return [in_place(view) for view in views_of(s, followed(s, side, frames), own, ADAPTIVE, asked)]
 
 
 def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
