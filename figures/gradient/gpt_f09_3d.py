@@ -132,7 +132,7 @@ FIGURE = Figure(
     arm="reuse",
     presets={
         "quick": {"replicas": 2, "blocks": 1, "side": 6, "frames": 3},
-        "paper": {"replicas": 32, "blocks": 2, "side": 16, "frames": LONG},
+        "paper": {"replicas": 32, "blocks": 2, "side": 12, "frames": LONG},
     },
     chunks=chunks,
     compute=compute,
