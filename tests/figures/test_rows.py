@@ -41,6 +41,21 @@ def test_who_is_judged_lasts_three_caps_of_pixels_and_of_pairs():
     assert asked[rows.REST] == asked[rows.KEPT] == 3 * GRADIENT.pixels.cap == 3 * GRADIENT.pairs.cap
 
 
+def capped_average(frames, cap):
+    """Variance of the mean of so many equal frames, where a history counts as `cap` of them at most."""
+    variance = 1.0
+    for k in range(1, frames):
+        history = min(k, cap)
+        variance = (history**2 * variance + 1) / (history + 1) ** 2
+    return variance
+
+
+@pytest.mark.parametrize(("frames", "above"), [(10, 4.1), (20, 2.05), (60, 1.02)])
+def test_three_caps_of_frames_end_near_the_least_variance_and_half_a_cap_does_not(frames, above):
+    """That is 1 / (2 cap + 1) of one frame's."""
+    assert capped_average(frames, 20) == pytest.approx(above / 41, rel=0.01)
+
+
 @pytest.mark.parametrize("scene", rows.SCENES)
 def test_a_longer_motion_ends_as_the_usual_one_at_the_same_pace(scene):
     longer, usual = rows.approach(scene, 60), widened(scene)
