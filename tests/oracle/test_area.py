@@ -267,6 +267,18 @@ def test_pairs_are_unbiased_over_three_frames_of_reuse_in_time_and_in_space(part
     assert largest_bias(pair_frames(scene, part), pair_group(scene.now, part).of[part], scene) < 1e-12
 
 
+def clamped(X, cap):
+    """A mistake: weights of history are clamped against fireflies."""
+    return replace(capped(X, cap), W=np.minimum(X.W, 1.0))
+
+
+def test_clamped_history_is_noticed_over_three_frames_of_reuse_in_time_and_in_space(monkeypatch) -> None:
+    monkeypatch.setattr("restir_ref.gradient_loop.capped", clamped)
+    scenes = [placed_scene(seed, suffixes=1, frames=3) for seed in range(3)]
+    of = [pair_group(scene.now, "positive").of["positive"] for scene in scenes]
+    assert max(map(largest_bias, [pair_frames(scene, "positive") for scene in scenes], of, scenes)) > 0.02
+
+
 def test_a_frame_of_pixels_alone_is_a_frame_of_area_reservoirs() -> None:
     scene = film_scene(3)
     views = [{"primal": group({"primal": frame})} for frame in scene.frames]
