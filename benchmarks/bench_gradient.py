@@ -4,7 +4,7 @@ A map of flatland and a piece of Checker3's floor, which stand still, in their s
 draw candidates for pairs: the pixels' trees are read by all of them (`offered`), as this project has it; every pair
 has trees of its own, for both of its signs, as in the paper [GPT 4.4]; every reservoir has (`candidates`).  All else
 is the same.  Rays are counted, times are ratios of CPU times of one run, the least of interleaved repeats.
-Exits with 1 if a tree for all saves less than half of the rays of initial candidates of dx + dy.  Takes 60 s.
+Exits with 1 if a tree for all saves less than half of the rays of initial candidates of dx + dy.  Takes 90 s.
 """
 
 import sys
