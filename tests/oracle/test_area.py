@@ -43,7 +43,7 @@ from restir_ref.oracle.film import (
 )
 from restir_ref.oracle.laws import bias_of, expected_sum
 from restir_ref.oracle.scenes import Scene, offset
-from restir_ref.restir import initial, resample, spatial
+from restir_ref.restir import capped, initial, resample, spatial
 from tests.oracle.pairs import labelled, largest_bias
 from tests.oracle.places import placed_scene
 
