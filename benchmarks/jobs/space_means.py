@@ -50,9 +50,9 @@ MODES: Mapping[str, Mode] = MappingProxyType(
     }
 )
 COUNTS: Mapping[str, tuple[int, ...]] = MappingProxyType(
-    {"CB3": (24, 24, 16, 24), "CB3-glossy": (64, 24, 32, 64), "Ajar3": (192, 48, 112, 192)}
+    {"CB3": (16, 24, 16, 24), "CB3-glossy": (24, 24, 24, 48), "Ajar3": (32, 48, 96, 96)}
 )
-"""Chunks of every mode by scene: more where the light is rare, and of single frames, which are noisier."""
+"""Chunks of every mode by scene: more where the light is rare, and of moving frames where it is rarest."""
 CASES: Mapping[tuple[str, str, str], int] = MappingProxyType(
     {
         (scene, rule, mode): count
@@ -60,7 +60,7 @@ CASES: Mapping[tuple[str, str, str], int] = MappingProxyType(
         for mode, count in zip(MODES, counts, strict=True)
         for rule in (("hybrid",) if mode == CONTROL else RULES)
     }
-    | {("CB3", "reconnection", TILED): 16, ("Ajar3", "reconnection", TILED): 160}
+    | {("CB3", "reconnection", TILED): 16, ("Ajar3", "reconnection", TILED): 144}
 )
 """Scene, shift and mode of every case, and how many chunks it has."""
 CELL = 6
