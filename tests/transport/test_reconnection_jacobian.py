@@ -51,7 +51,7 @@ class Reconnected:
 
 @cache
 def reconnected(name: str) -> Reconnected:
-    """The first random configurations whose connection stands, does not graze, and stays on its primitive while the ray turns."""
+    """The first random configurations whose connection stands and does not graze, on one primitive as the ray turns."""
     if name in BOXES:
         s = film_shifts(tracer3d.SCENES[name](), RECONNECTION, 20_000, seed=31)
     else:
