@@ -50,7 +50,7 @@ MODES: Mapping[str, Mode] = MappingProxyType(
     }
 )
 COUNTS: Mapping[str, tuple[int, ...]] = MappingProxyType(
-    {"CB3": (16, 24, 16, 24), "CB3-glossy": (24, 24, 24, 48), "Ajar3": (32, 48, 96, 96)}
+    {"CB3": (16, 24, 16, 24), "CB3-glossy": (24, 24, 24, 48), "Ajar3": (32, 48, 72, 96)}
 )
 """Chunks of every mode by scene: more where the light is rare, and of moving frames where it is rarest."""
 CASES: Mapping[tuple[str, str, str], int] = MappingProxyType(
