@@ -115,16 +115,16 @@ def test_the_offset_path_and_one_from_numbers_in_single_precision_are_others() -
 # ---------------------------------------------------------------- distance
 
 
-def nearest(scene: str, rule: Connectability, count: int = 10 * N) -> tuple[float, float]:
+def nearest(scene: str, rule: Connectability) -> tuple[float, float]:
     """The shortest connection of all base paths, and of all offset paths."""
-    return nearest_connections(successful(film_shifts(SCENES[scene](), rule, count, seed=4)))
+    return nearest_connections(successful(film_shifts(SCENES[scene](), rule, 10 * N, seed=4)))
 
 
 @pytest.mark.claims("GRIS-A12", world="tracer3d")
 @every_scene
 def test_hybrid_connects_nothing_nearer_than_its_distance(scene) -> None:
     assert 0.01 <= RULES["hybrid"].distance / SCENES[scene]().scene.extent <= 0.05
-    assert min(nearest(scene, RULES["hybrid"], N)) >= RULES["hybrid"].distance
+    assert min(nearest(scene, RULES["hybrid"])) >= RULES["hybrid"].distance
 
 
 @pytest.mark.claims("GRIS-A12", world="tracer3d")
