@@ -5,6 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from figures.experiments.following import followed
 from figures.gradient import gpt_f09 as flat
 from figures.gradient import gpt_f09_3d as space
 from flatland2d.scenes import rack
@@ -69,12 +70,37 @@ def made(ratio, rays, replicas=64):
     ("ratio", "rays", "passed"), [(0.6, 1.4, (True, True)), (0.65, 1.5, (True, False)), (0.8, 1.0, (False, True))]
 )
 def test_equal_samples_need_seven_tenths_and_equal_rays_nine(ratio, rays, passed):
-    found = [claim.outcome.passed for claim in space.check(made(ratio, rays))[:2]]
+    found = [claim.outcome.passed for claim in space.check(made(ratio, rays))[:3:2]]
     assert tuple(found) == passed
 
 
+def test_a_ratio_that_one_replica_decides_is_left_open():
+    a = made(0.4, 1.0)
+    a["rack.same sign.dx"][0] *= 12
+    assert space.check(a)[0].outcome is None
+
+
+@pytest.mark.parametrize(("row", "column", "seen"), [(540, 1257, (0.67, 0.67)), (540, 960, (0.0, 0.10))])
+def test_the_bar_sees_both_lamps_and_the_floor_between_does_not(row, column, seen):
+    s, rng, n = space.rack(), np.random.default_rng(1), 4000
+    x, w, _ = s.pinhole().through(np.array([column + 0.5]), np.array([row + 0.5]))
+    v, _, _ = arrive(s.scene, x, w)
+    for share, wall in zip(seen, (0.005, 0.995), strict=True):
+        lamp = np.stack([np.full(n, wall), rng.uniform(0.5, 0.8, n), rng.uniform(0.3, 0.7, n)])
+        d = lamp - v.x
+        far = np.linalg.norm(d, axis=0)
+        _, t, _ = arrive(s.scene, np.repeat(v.x + 1e-6 * v.n, n, axis=1), d / far)
+        assert (abs(t - far) < 1e-3).mean() == pytest.approx(share, abs=0.03)
+
+
+def test_the_crop_is_on_the_bar():
+    s = space.rack()
+    last = followed(s, 12, 1)[0]
+    assert (last.left + 6, last.top + 6) == (1257, 540)
+
+
 def test_few_replicas_are_not_judged():
-    assert [claim.outcome is None for claim in space.check(made(0.6, 1.4, replicas=32))[:2]] == [True, True]
+    assert [claim.outcome is None for claim in space.check(made(0.6, 1.4, replicas=32))[:4]] == [True] * 4
 
 
 def test_the_paper_preset_lasts_three_caps():
