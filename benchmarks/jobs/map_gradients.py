@@ -27,7 +27,7 @@ from restir_ref.gradient_loop import GRADIENT, View, forward
 from restir_ref.transport.paths import Tracer, Tree, leaves
 from restir_ref.transport.restir_pt import ScatteredIntegrals
 
-SCENE, SIDE, REPLICAS = "occluders", 9, 64
+SCENE, SIDE, REPLICAS = "occluders", 9, 32
 """The scene; rows and columns of the map, whose 72 differences either way are eight blocks; replicas of a chunk."""
 
 STEP, ALONG = 0.35, np.array([1.0, 0.6])
@@ -49,14 +49,14 @@ DIRECTIONS, TRUTH, LATTICES = ("dx", "dy"), "truth", 16
 
 CASES: Mapping[str, tuple[int, float]] = MappingProxyType(
     {
-        TRUTH: (24, 0.0),
-        "frame 1": (160, 0.01),
-        "frame 5, still": (20, 0.0125),
+        TRUTH: (12, 0.0),
+        "frame 1": (200, 0.01),
+        "frame 5, still": (32, 0.015),
         "frame 20, still": (16, 0.01),
-        "frame 5, kept": (20, 0.0125),
-        "frame 5, gathered": (20, 0.015),
-        "frame 20, kept": (20, 0.0125),
-        "frame 20, gathered": (20, 0.015),
+        "frame 5, kept": (28, 0.015),
+        "frame 5, gathered": (28, 0.015),
+        "frame 20, kept": (24, 0.015),
+        "frame 20, gathered": (24, 0.02),
     }
 )
 """Chunks of every mode, and the largest standard error."""
