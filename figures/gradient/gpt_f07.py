@@ -72,18 +72,30 @@ def rebuilt(a: Arrays, scene: str, method: str) -> Array:
     return np.asarray(l2(primal, dx, dy))
 
 
-def primal(a: Arrays, scene: str) -> Array:
-    """The better image of ReSTIR without differences at about the same rays: with a round in space, or without."""
-    each = [averaged(a[f"{scene}.{name}.primal"], SHARES[name]) for name in ("after", "temporal")]
-    return min(each, key=lambda images: float(images.var(axis=0).mean())).reshape(-1, SIDE, SIDE)
+def primal(a: Arrays, scene: str) -> dict[str, Array]:
+    """Noise of the better image of ReSTIR without differences: with a round in space, or without."""
+    shape = (-1, SIDE, SIDE)
+    each = [
+        bands(at_equal_rays(a, scene, name)["primal"].reshape(shape), rays_of(a, scene, name))
+        for name in ("after", "temporal")
+    ]
+    return min(each, key=lambda found: float(found["all frequencies"].mean()))
 
 
-def bands(images: Array) -> tuple[Array, Array, Array]:
-    """Variance of images, (R,): all of it, of their mean, which alone is below alpha in so small a map, and above."""
+def bands(images: Array, cost: float) -> dict[str, Array]:
+    """Variance of images times the rays they cost, (R,): all of it, and what is below and above alpha.
+
+    Below alpha there is the mean alone in so small a map.
+    """
     R = len(images)
-    noise = (images - images.mean(axis=0)) * np.sqrt(R / (R - 1))
+    noise = (images - images.mean(axis=0)) * np.sqrt(R / (R - 1) * cost)
     low, high = band_powers(noise, ALPHA, MAP)
-    return (noise**2).mean(axis=MAP), low, high
+    return {"all frequencies": (noise**2).mean(axis=MAP), "its mean": low, "above alpha": high}
+
+
+def noise_of(a: Arrays, scene: str, method: str) -> dict[str, Array]:
+    """That of a method's reconstruction."""
+    return bands(rebuilt(a, scene, method), rays_of(a, scene, method))
 
 
 def check(a: Arrays) -> list[Claim]:
@@ -114,12 +126,13 @@ def reconstruction(a: Arrays) -> list[Claim]:
     """Noise of the reconstruction against that of the primal image, and against the other gradients'."""
     claims = []
     for scene in SCENES:
-        ours, theirs = bands(rebuilt(a, scene, "with")), bands(primal(a, scene))
-        for k, band in enumerate(("all frequencies", "its mean", "above alpha")):
-            text = criteria.ratio_interval(ours[k], theirs[k])[2]
+        ours, image = noise_of(a, scene, "with"), primal(a, scene)
+        for band, mine in ours.items():
+            text = criteria.ratio_interval(mine, image[band])[2]
             claims.append(Claim("GPT-F08", criteria.reported(text), f"{scene}, L2 with / primal, {band}"))
         for method in ("after", "path tracing"):
-            text = criteria.ratio_interval(ours[0], bands(rebuilt(a, scene, method))[0])[2]
+            theirs = noise_of(a, scene, method)["all frequencies"]
+            text = criteria.ratio_interval(ours["all frequencies"], theirs)[2]
             claims.append(Claim("GPT-F08", criteria.reported(text), f"{scene}, L2 with / L2 {method}"))
     return claims
 

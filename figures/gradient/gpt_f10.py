@@ -19,13 +19,15 @@ from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments.flatland import displaced
 from figures.experiments.gradients import ADAPTIVE, DENSE, NONE, Spatial, gradient_view, spread, with_restir
+from figures.experiments.pans import panned
 from figures.experiments.replicas import few, smaller
 from figures.experiments.views import setting
 from figures.report import style
 from flatland2d.sensors import Pinhole
 from restir_ref.batch import Array
 from restir_ref.chance import Live
-from restir_ref.gradient_loop import GRADIENT, GradientPreset
+from restir_ref.gradient_loop import GRADIENT, GradientPreset, forward
+from restir_ref.transport.edges import edges, like_pairs, seen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
@@ -90,27 +92,37 @@ def check(a: Arrays) -> list[Claim]:
         everywhere = [spread([a[f"{scene}.{arm}.dx"]]) for arm in ARMS]
         claims += [
             smaller(id_, (everywhere[2], everywhere[1]), 1.05, f"{scene}, adaptive / random neighbours, all pairs"),
-            in_a_row(id_, (ours, none), 0.9, f"{scene}, adaptive / no neighbours, edge pairs"),
+            in_a_row(id_, (ours, none), f"{scene}, adaptive / no neighbours, edge pairs"),
             Claim(id_, criteria.above(saved(a, scene), 0.25), f"{scene}, rays of spatial reuse of pairs saved"),
             Claim(id_, criteria.reported(of_all(a, scene)), f"{scene}, of all rays of a frame", reason=EDGES_DECIDE),
         ]
         if scene == "checker":
             claims += [
-                in_a_row("GPT-F06", (ours, none), 1, f"{scene}, aligned / no neighbours, edge pairs"),
-                in_a_row("GPT-F06", (ours, random), 1, f"{scene}, aligned / random neighbours, edge pairs"),
+                in_a_row("GPT-F06", (ours, none), f"{scene}, aligned / no neighbours, edge pairs"),
+                in_a_row("GPT-F06", (ours, random), f"{scene}, aligned / random neighbours, edge pairs"),
                 unchanged(a, scene),
             ]
     return claims
 
 
-NO_EDGE = "A row has no neighbours on the same edge, only other edges: GPT-F10-3D has them."
-
-
-def in_a_row(id_: str, pair: tuple[Array, Array], limit: float, part: str) -> Claim:
-    """Below the limit; nothing is refuted where there are no neighbours on the same edge."""
+def in_a_row(id_: str, pair: tuple[Array, Array], part: str) -> Claim:
+    """Reported, not judged: what aligned neighbours are good for is not in a row, whose edges are single points."""
+    why = f"A row has no neighbours on the same edge: {alike_in(part.partition(',')[0])}.  GPT-F10-3D judges in space."
     if few(pair[0]):
-        return Claim(id_, None, part, reason=f"{few(pair[0])} {NO_EDGE}")
-    return Claim(id_, criteria.ratio_below(*pair, limit), part, reason=NO_EDGE)
+        return Claim(id_, None, part, reason=f"{few(pair[0])} {why}")
+    return Claim(id_, criteria.reported(criteria.ratio_interval(*pair)[2]), part, reason=why)
+
+
+def alike_in(scene: str) -> str:
+    """How far apart the nearest two edge pairs of the last frame are that see alike, in words."""
+    (sensor,), ends = panned(scene, FILM, STEP, 1), forward((FILM,))["dx"][0]
+    g = seen(setting(scene).scene, sensor)
+    edge = np.flatnonzero(edges(g, ends))
+    i, j = (edge[each] for each in np.triu_indices(len(edge), 1))
+    apart = (j - i)[like_pairs(g, ends)(i, j)]
+    if not len(apart):
+        return f"no two of its {len(edge)} edge pairs see alike"
+    return f"the nearest two of its {len(edge)} edge pairs that see alike are {apart.min()} pairs apart"
 
 
 def unchanged(a: Arrays, scene: str) -> Claim:

@@ -179,14 +179,27 @@ def biases(a: Arrays) -> list[Claim]:
     truth = a["reference"]
     halves = np.sign(truth - np.median(truth))
     l2_row, l1_row = (rebuilt_row(a, norm) for norm in (l2, l1))
-    mean = partial(criteria.unbiased, l2_row.mean(axis=1), float(truth.mean()))
-    half = partial(criteria.unbiased, (l2_row * halves).mean(axis=1), float((truth * halves).mean()))
     off = partial(criteria.reported, f"{l1_row.mean() / truth.mean() - 1:+.2%}")
     return [
-        judged("GPT-C03", "L2, mean of the occluder row", few(l2_row), mean),
-        judged("GPT-C03", "L2, bright less dark half of the row", few(l2_row), half),
+        told_apart("L2, mean of the occluder row", l2_row.mean(axis=1), float(truth.mean())),
+        told_apart(
+            "L2, bright less dark half of the row", (l2_row * halves).mean(axis=1), float((truth * halves).mean())
+        ),
         judged("GPT-C03", "bias of L1, mean of the occluder row", few(l2_row), off),
     ]
+
+
+def told_apart(part: str, estimates: Array, truth: float) -> Claim:
+    """Unbiased to EXACT, unless no bias is seen and one of that size could not be: then it is left open."""
+    outcome = criteria.unbiased(estimates, truth, EXACT)
+    error = float(estimates.std(ddof=1) / np.sqrt(len(estimates)))
+    blind = error > EXACT * abs(truth) and abs(float(estimates.mean()) - truth) <= 4 * error
+    open_ = f"Measured {outcome.measured}, asked {outcome.criterion}: too noisy to tell." if blind else ""
+    return judged("GPT-C03", part, few(estimates) or open_, lambda: outcome)
+
+
+EXACT = 0.005
+"""The largest standard error, over the truth, that tells an unbiased estimate."""
 
 
 def outliers(a: Arrays) -> list[Claim]:

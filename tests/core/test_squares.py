@@ -1,11 +1,12 @@
-"""Frames under a camera that pans by fractions of a pixel, whose history stays in place: differences to 2%."""
+"""Frames under a camera that stands still or pans by fractions of a pixel, whose history stays: differences to 2%."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from restir_ref.area import Following
+from restir_ref.area import MOVED, Following
 from restir_ref.batch import Array
 from restir_ref.chance import Live
 from restir_ref.gradient_loop import (
@@ -21,10 +22,13 @@ from restir_ref.gradient_loop import (
 from restir_ref.images import random_in_disk
 from restir_ref.integrals import NOWHERE, Pixels, Shifted
 from restir_ref.loop import Preset, random_in_row
+from restir_ref.restir import capped
 from restir_ref.squares import Squares, keeping
 
 PAN = np.array([0.3, -0.4])
 """Pixels per frame, to the right and down."""
+
+STILL = np.zeros(2)
 
 PERIOD = 5.2
 """Of the sheet's waves, in pixels."""
@@ -87,9 +91,9 @@ PRESET = GradientPreset(Preset(1, 0, 1, 2, 2.0), Preset(1, 0, 1, 2, 2.0))
 """Reuse in time alone, of a short history: rejection makes noise in every frame, and 2% are to be seen."""
 
 
-def view(of: Sheet, follow: Following) -> dict[str, Group]:
+def view(of: Sheet, follow: Following, pan: Array) -> dict[str, Group]:
     around = random_in_disk(of.shape) if len(of.shape) == 2 else random_in_row
-    motion, everybody = np.tile(PAN[: len(of.shape), None], of.n), np.ones(of.n, dtype=bool)
+    motion, everybody = np.tile(pan[: len(of.shape), None], of.n), np.ones(of.n, dtype=bool)
     found = {PRIMAL: Group({PRIMAL: of}, of.shape, motion, around, everybody, follow)}
     for name, (ends, shape) in forward(of.shape).items():
         E = ends.shape[1]
@@ -98,12 +102,20 @@ def view(of: Sheet, follow: Following) -> dict[str, Group]:
     return found
 
 
-def rendered(shape: tuple[int, ...], frames: int, follow: Following, replicas: int) -> dict[str, tuple[Array, Array]]:
-    """Estimates (R, n) and the truth of every group after so many frames."""
+def rendered(
+    shape: tuple[int, ...],
+    frames: int,
+    follow: Following,
+    replicas: int,
+    *,
+    pan: Array = PAN,
+    directions: Sequence[str] = ("dx", "dy"),
+) -> dict[str, tuple[Array, Array]]:
+    """Estimates (R, n) and the truth of the image and of its differences in these directions after so many frames."""
     chance, last = Live(np.random.default_rng(frames)), None
     for k in range(frames):
-        of = Sheet(shape, (k - frames) * PAN[: len(shape)])
-        now = view(of, follow)
+        of = Sheet(shape, (k - frames) * pan[: len(shape)])
+        now = {name: group for name, group in view(of, follow, pan).items() if name in (PRIMAL, *directions)}
         last = now, step(now, chance, PRESET, replicas, last)
     image = of.image()
     truth = {name: image[ends[0]] - image[ends[1]] for name, (ends, _) in forward(shape).items()} | {PRIMAL: image}
@@ -133,6 +145,32 @@ def test_differences_under_a_pan_by_fractions_are_unbiased_to_2_percent(frames, 
         mean, error = probe(estimates, truth)
         assert error < SEEN, name
         assert abs(mean) < 0.02, name
+
+
+@pytest.mark.claims("GPT-A02", "GPT-A05", part="differences to 2%, a camera that stands still")
+@pytest.mark.parametrize("shape", [(7, 8), (40,)])
+@pytest.mark.parametrize("frames", [5, 20])
+@pytest.mark.parametrize("follow", [keeping, MOVED], ids=["kept", "moved"])
+def test_differences_under_a_camera_that_stands_still_are_unbiased_to_2_percent(follow, frames, shape) -> None:
+    for name, (estimates, truth) in rendered(shape, frames, follow, 160, pan=STILL).items():
+        mean, error = probe(estimates, truth)
+        assert error < SEEN, name
+        assert abs(mean) < 0.02, name
+
+
+def clamped(X, cap):
+    """A mistake: weights of history are clamped against fireflies."""
+    Y = capped(X, cap)
+    return replace(Y, W=np.minimum(Y.W, 2.0))
+
+
+@pytest.mark.parametrize("follow", [keeping, MOVED], ids=["kept", "moved"])
+def test_clamped_history_is_noticed_in_the_differences_of_a_camera_that_stands_still(follow, monkeypatch) -> None:
+    monkeypatch.setattr("restir_ref.gradient_loop.capped", clamped)
+    found = rendered((7, 8), 5, follow, 160, pan=STILL)
+    for name in ("dx", "dy"):
+        mean, error = probe(*found[name])
+        assert abs(mean) > 0.02 + 4 * error, name
 
 
 class Everything(Squares):

@@ -27,6 +27,7 @@ from benchmarks.jobs import (
     retracing,
     roundtrips,
     space_gradients,
+    space_means,
     space_offline,
 )
 from benchmarks.jobs import tracing as tracing_job
@@ -34,12 +35,14 @@ from benchmarks.jobs.comparing import Sums, joined, judged, nothing, spread, spr
 from benchmarks.jobs.job import Job, Row, parts, run
 from benchmarks.jobs.references import lattice
 from benchmarks.jobs.roundtrips import Trips
+from figures.experiments.references import Reference
 from flatland2d import SCENES
 from restir_ref.batch import Array, take
-from restir_ref.integrals import Pixels
+from restir_ref.integrals import Pixels, Shifted
 from restir_ref.loop import random_in_row
 from restir_ref.transport import shifts as shifts_module
 from restir_ref.transport.paths import radiance
+from restir_ref.transport.restir_pt import PathIntegrals
 
 # ---------------------------------------------------------------- the machine
 
@@ -430,6 +433,74 @@ def test_frames_in_space_are_judged_by_lattices_of_the_same_pixels(monkeypatch) 
     right = found[space_offline.TRUTH].mean()
     assert [images.mean() for images in found.values()] == pytest.approx([right] * 3, rel=0.05)
     assert {params["rule"] for params in space_offline.chunks(0.01)} == {*RULES3}
+
+
+def crops_reused(monkeypatch, mode: str) -> Row:
+    """What a few images of a case in space say; chance allows any spread of so few chunks."""
+    case = "CB3", "hybrid", mode
+    monkeypatch.setattr(space_means, "CASES", {case: 4})
+    monkeypatch.setattr(space_means, "EPS", 0.02)
+    (found,) = rows(space_means.JOB, 1.0)
+    return found
+
+
+BETTER = {
+    "across pixels": "the frames' own samples",
+    "along time, still": "the reference",
+    "along time and across pixels, moving": "the reference",
+}
+"""After a single frame most samples are still a pixel's own."""
+
+
+@pytest.mark.parametrize("mode", BETTER)
+def test_reuse_in_space_has_no_bias_at_a_tiny_count_and_the_better_truth_judges(monkeypatch, mode) -> None:
+    found = crops_reused(monkeypatch, mode)
+    assert found.holds
+    assert found.what.endswith(f"bias against {BETTER[mode]}")
+    assert found.error < float(found.note.rpartition(" ")[2].rstrip("%")) / 100
+
+
+def test_the_brighter_neighbour_turns_the_means_of_space_red(monkeypatch) -> None:
+    """A mistake: neighbours chosen by their samples."""
+    right = space_means.spatial
+
+    def by_brightness(X, here, near, chance, mis):
+        one, other = (X.x.F.mean(axis=0)[at.index] * X.W[at.index] for at in near[:2])
+        brighter = np.where(one > other, near[0].index, near[1].index)
+        return right(X, here, [Pixels(here.of, brighter)], chance, mis=mis)
+
+    monkeypatch.setattr(space_means, "spatial", by_brightness)
+    assert not crops_reused(monkeypatch, "across pixels").holds
+
+
+class Dimming(PathIntegrals):
+    """A mistake: J is too small by a tenth."""
+
+    def shift(self, x, index, to) -> Shifted:
+        y = super().shift(x, index, to)
+        return Shifted(y.x, 0.9 * y.J)
+
+
+def test_a_jacobian_that_is_too_small_turns_moving_frames_red(monkeypatch) -> None:
+    right = space_means.view
+    monkeypatch.setattr(space_means, "view", lambda *asked: right(*asked, integrals=Dimming))
+    assert not crops_reused(monkeypatch, "along time and across pixels, moving").holds
+
+
+def test_path_reuse_shows_the_crops_where_they_are() -> None:
+    params = {"scene": "CB3", "rule": "reconnection", "mode": space_means.TILED, "part": 0}
+    found = space_means.compute(params, rng=np.random.default_rng(1))["result.total"][0] / space_means.REPLICAS
+    truth = space_means.in_cells(space_means.reference("CB3")).mean
+    assert found == pytest.approx(truth, rel=1, abs=truth.mean() / 2)
+    assert np.corrcoef(found, truth)[0, 1] > 0.95
+
+
+def test_a_cell_s_error_is_that_of_independent_pixels() -> None:
+    image, noise = np.arange(1152.0).reshape(1, -1), np.random.default_rng(1).standard_normal((4000, 1152))
+    truth = space_means.in_cells(Reference(image[0], np.full(1152, 0.3), 0.0, 1, ""))
+    assert truth.mean.shape == (32,)
+    assert truth.mean[:2] == pytest.approx([2.5 + 24 * 2.5, 8.5 + 24 * 2.5])
+    assert truth.error == pytest.approx(space_means.cells(0.3 * noise).std(axis=0), rel=0.05)
 
 
 TRUE = np.linspace(-1, 2, 72)

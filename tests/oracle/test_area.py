@@ -43,8 +43,9 @@ from restir_ref.oracle.film import (
 )
 from restir_ref.oracle.laws import bias_of, expected_sum
 from restir_ref.oracle.scenes import Scene, offset
-from restir_ref.restir import initial, resample, spatial
+from restir_ref.restir import capped, initial, resample, spatial
 from tests.oracle.pairs import labelled, largest_bias
+from tests.oracle.places import placed_scene
 
 
 def area_frames(scene: Scene, by: Array, kind=Displaced):
@@ -235,15 +236,17 @@ def pair_group(frame: Frame, *parts: str) -> Group:
 
 
 def pair_frames(scene: Scene, *parts: str, partners=SAME_SIGN):
-    """The first part after temporal area reuse and spatial reuse, of candidates drawn once per pixel."""
-    before, now = (pair_group(frame, *parts) for frame in scene.frames)
+    """The first part of all frames, each after area reuse in time and reuse in space; candidates once per pixel."""
+    groups = [pair_group(frame, *parts) for frame in scene.frames]
 
     def loop(index, chance):
-        at = len(index) // 2
-        Y = first(before, index, sampled(scene.frames[0], chance, 1, at), chance)
-        X = first(now, index, sampled(scene.now, chance, 1, at), chance)
-        X = in_time(now, X, (before, Y), PRESET.pairs, partners, chance)
-        return labelled(in_space(now, X, PRESET.pairs, partners, chance)[parts[0]], CELLS)
+        last = None
+        for frame, now in zip(scene.frames, groups, strict=True):
+            X = first(now, index, sampled(frame, chance, 1, len(index) // 2), chance)
+            if last is not None:
+                X = in_space(now, in_time(now, X, last, PRESET.pairs, partners, chance), PRESET.pairs, partners, chance)
+            last = now, X
+        return labelled(X[parts[0]], scene.v.shape[-1])
 
     return loop
 
@@ -254,6 +257,26 @@ def pair_frames(scene: Scene, *parts: str, partners=SAME_SIGN):
 def test_pairs_are_unbiased_over_two_frames_of_area_reuse_from_trees_that_all_pairs_share(part, seed) -> None:
     scene = film_scene(seed)
     assert largest_bias(pair_frames(scene, part), pair_group(scene.now, part).of[part], scene) < 1e-12
+
+
+@pytest.mark.claims("GPT-A02", "GPT-E24", part="three frames")
+@pytest.mark.parametrize("part", SIGNS)
+@pytest.mark.parametrize("seed", range(3))
+def test_pairs_are_unbiased_over_three_frames_of_reuse_in_time_and_in_space(part, seed) -> None:
+    scene = placed_scene(seed, suffixes=1, frames=3)
+    assert largest_bias(pair_frames(scene, part), pair_group(scene.now, part).of[part], scene) < 1e-12
+
+
+def clamped(X, cap):
+    """A mistake: weights of history are clamped against fireflies."""
+    return replace(capped(X, cap), W=np.minimum(X.W, 1.0))
+
+
+def test_clamped_history_is_noticed_over_three_frames_of_reuse_in_time_and_in_space(monkeypatch) -> None:
+    monkeypatch.setattr("restir_ref.gradient_loop.capped", clamped)
+    scenes = [placed_scene(seed, suffixes=1, frames=3) for seed in range(3)]
+    of = [pair_group(scene.now, "positive").of["positive"] for scene in scenes]
+    assert max(map(largest_bias, [pair_frames(scene, "positive") for scene in scenes], of, scenes)) > 0.02
 
 
 def test_a_frame_of_pixels_alone_is_a_frame_of_area_reservoirs() -> None:

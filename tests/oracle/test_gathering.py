@@ -29,6 +29,7 @@ from tests.oracle.test_squares import (
     MAPS,
     MOTIONS,
     QUARTERS,
+    bias_of_three,
     each_seed,
     four_pixels,
     group,
@@ -37,6 +38,7 @@ from tests.oracle.test_squares import (
     one_step,
     pair_frames,
     sheet,
+    without_sign,
 )
 
 frames_of = partial(kept, reuse=area_gathering)
@@ -297,6 +299,17 @@ def test_pairs_that_gather_are_unbiased_in_every_cell(part, seed) -> None:
     scene = placed_scene(seed)
     pairs = pairs_of(scene.now, RING, {part: (part,)})[part]
     assert largest_bias(pair_frames(scene, part, follow=gathering), pairs, scene) < 1e-12
+
+
+@pytest.mark.claims("GPT-A02", "GPT-A05", "GPT-E24", part="three frames")
+@pytest.mark.parametrize("part", SIGNS)
+def test_pairs_that_gather_are_unbiased_over_three_frames(part) -> None:
+    assert bias_of_three(placed_scene(0, frames=3), part, gathering) < 1e-12
+
+
+def test_a_second_frame_that_gathers_without_its_sign_is_noticed_in_the_third() -> None:
+    scenes = [placed_scene(seed, suffixes=1, frames=3) for seed in range(3)]
+    assert max(bias_of_three(scene, "positive", gathering, without_sign) for scene in scenes) > 0.02
 
 
 @pytest.mark.claims("GPT-A09")

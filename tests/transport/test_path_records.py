@@ -33,8 +33,11 @@ from restir_ref.transport.scene import Scene
 from restir_ref.transport.scene import scene as compiled
 from restir_ref.transport.shifts import shift_path
 from restir_ref.transport.vectors import normalize
+from tests.tracer3d.views import film_shifts
 from tests.transport.furnished import FURNISHED, furnished_shifts
 from tests.transport.paths import HYBRID, RULES, Shifts, retraced, shifts, successful
+from tracer3d.scenes import Setting, cornell_box
+from tracer3d.scenes import matte as solid_matte
 
 every_scene = pytest.mark.parametrize("scene", SCENES)
 every_rule = pytest.mark.parametrize("rule", RULES)
@@ -221,12 +224,19 @@ def test_a_shift_that_stays_in_its_pixel_is_noticed() -> None:
 COAT, BASE = 0.1, 1.0
 """Roughness of the clear coat and of Lambert lobes, from the scene's definition."""
 
+
+def coated_box() -> Setting:
+    """The Cornell box in space whose left wall is like the floor of `clear_coat`; all else has one lobe."""
+    coat = Material([Layer("lambert", (0.5,) * 3, weight=0.6), Layer("ggx", (0.3,) * 3, COAT, weight=0.4)])
+    return cornell_box([solid_matte((0.5,) * 3), coat, solid_matte((0.1, 0.4, 0.1)), solid_matte((0.6,) * 3)])
+
+
 Judge = Callable[[Scene, Path, ExtendedPath, int, int], float]
 """Roughness of x_i of column n."""
 
 
 def lobe_at(t: Tracer, x: Path, on: ExtendedPath, n: int, i: int) -> int:
-    """The floor (material 1) has a base of share .6 and a coat; all else has one lobe."""
+    """The floor, or the wall, (material 1) has a base of share .6 and a coat; all else has one lobe."""
     coated = t.scene.material[on.prim[i, n]] == 1
     return int(coated and t.lobe_number(x.u, i)[n] >= 0.6)
 
@@ -267,8 +277,16 @@ def verdicts(t: Tracer, x: Path, on: ExtendedPath, judge: Judge) -> list[tuple[i
     return found
 
 
-def clear_coat(rule: str) -> tuple[Shifts, ExtendedPath]:
-    s = shifts(SCENES["clear_coat"](), RULES[rule], 1500, seed=47)
+COATED: dict[str, Callable[[str, int, int], Shifts]] = {
+    "floor": lambda rule, N, seed: shifts(SCENES["clear_coat"](), RULES[rule], N, seed, reach=400),
+    "wall in space": lambda rule, N, seed: film_shifts(coated_box(), RULES[rule], N, seed),
+}
+"""Shifts that often lead to another material."""
+every_coat = pytest.mark.parametrize("where", COATED)
+
+
+def clear_coat(rule: str, where: str) -> tuple[Shifts, ExtendedPath]:
+    s = COATED[where](rule, 1500, 47)
     return s, extended_path(s.t, s.x.u, s.i, s.x.k, s.x.nee)
 
 
@@ -279,26 +297,32 @@ def recorded(x: Path) -> list[tuple[int, int, int]]:
 
 
 @pytest.mark.claims("GRIS-A13")
+@pytest.mark.claims("GRIS-A13", world="tracer3d")
+@every_coat
 @pytest.mark.parametrize("rule", ["hybrid", "reconnection"])
-def test_lobes_and_the_reconnection_index_follow_the_rules(rule) -> None:
-    s, on = clear_coat(rule)
+def test_lobes_and_the_reconnection_index_follow_the_rules(rule, where) -> None:
+    s, on = clear_coat(rule, where)
     assert recorded(s.x) == verdicts(s.t, s.x, on, by_the_rules)
     assert {c for c, _, _ in recorded(s.x)} >= {"hybrid": {0, 2, 3}, "reconnection": {0, 2}}[rule]
 
 
 @pytest.mark.claims("GRIS-A13")
+@pytest.mark.claims("GRIS-A13", world="tracer3d")
+@every_coat
 @pytest.mark.parametrize("wrong", [light_sampling_by_its_lobe, by_the_roughest, by_the_smoothest])
-def test_other_rules_are_noticed(wrong) -> None:
-    s, on = clear_coat("hybrid")
+def test_other_rules_are_noticed(wrong, where) -> None:
+    s, on = clear_coat("hybrid", where)
     differ = [a != b for a, b in zip(recorded(s.x), verdicts(s.t, s.x, on, wrong), strict=True)]
     assert np.mean(differ) > 0.02
 
 
 @pytest.mark.claims("GRIS-A13")
+@pytest.mark.claims("GRIS-A13", world="tracer3d")
+@every_coat
 @pytest.mark.parametrize("rule", ["hybrid", "reconnection"])
-def test_a_reconnection_takes_over_the_base_path_s_lobe(rule) -> None:
+def test_a_reconnection_takes_over_the_base_path_s_lobe(rule, where) -> None:
     """Also where the offset vertex, on another material, would have chosen another lobe by its number."""
-    s = successful(shifts(SCENES["clear_coat"](), RULES[rule], 3000, 49, reach=400))
+    s = successful(COATED[where](rule, 3000, 49))
     c = np.flatnonzero(s.x.c > 0)
     assert (s.y.lobe_in[c] == s.x.lobe_in[c]).all()
     assert (s.y.lobe_out[c] == s.x.lobe_out[c]).all()

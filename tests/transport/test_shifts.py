@@ -3,7 +3,7 @@
 Image means are nearly blind to wrong Jacobians, for reuse is nearly symmetric; these laws are not.
 """
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,10 +17,11 @@ from restir_ref.transport.paths import Connectability
 from restir_ref.transport.proofs.inversion import connection, primary_sample, traced
 from restir_ref.transport.proofs.reading import extended_path
 from restir_ref.transport.scene import scene
-from restir_ref.transport.shifts import replay, shift_path
+from restir_ref.transport.shifts import shift_path
 from restir_ref.transport.vectors import norm
 from tests.transport.furnished import FURNISHED, furnished_shifts
 from tests.transport.paths import HYBRID, RULES, finite_difference_jacobian, retraced, shifts, successful
+from tests.transport.returns import differing, differing_by_replay, nearest_connections
 
 N = 1500
 every_scene = pytest.mark.parametrize("scene", SCENES)
@@ -49,11 +50,6 @@ def test_a_shift_there_and_back_returns_the_path_with_inverse_jacobians(scene, r
     assert np.abs(back.F / s.x.F - 1)[:, returned].max(initial=0) < 1e-9
     assert np.abs(back.A / s.x.A - 1)[returned].max(initial=0) < 1e-9
     assert differing(back, replace(s.x, F=back.F, A=back.A)) == set()
-
-
-def differing(a, b) -> set[str]:
-    """The fields of two batches of paths that are not bitwise equal."""
-    return {each.name for each in fields(a) if getattr(a, each.name).tobytes() != getattr(b, each.name).tobytes()}
 
 
 def lit(s):
@@ -140,22 +136,16 @@ def jacobian_errors(s, J) -> np.ndarray:
     return np.abs(measured / J[few] - 1)[same]
 
 
-def nearest_connections(scene, rule, count=N) -> tuple[float, float]:
+def nearest(scene, rule, count=N) -> tuple[float, float]:
     """The shortest connection of all base paths, and of all offset paths."""
-    s, found = successful(shifts(SCENES[scene](), rule, count, seed=4)), []
-    connected = s.x.c > 0
-    for path, pixel in ((s.x, s.i), (s.y, s.j)):
-        part = take(path, np.flatnonzero(connected))
-        v = replay(s.t, part, pixel[connected]).v
-        found.append(float(np.linalg.norm(part.z - v.x, axis=0).min(initial=1)))
-    return found[0], found[1]
+    return nearest_connections(successful(shifts(SCENES[scene](), rule, count, seed=4)))
 
 
 @pytest.mark.claims("GRIS-A12")
 @every_scene
 def test_hybrid_connects_nothing_nearer_than_its_distance(scene) -> None:
     assert 0.01 <= HYBRID.distance / SCENES[scene]().scene.extent <= 0.05
-    assert min(nearest_connections(scene, HYBRID)) >= HYBRID.distance
+    assert min(nearest(scene, HYBRID)) >= HYBRID.distance
 
 
 NEAR = [("glossy_cornell", 0.02), ("crease", 0.05)]
@@ -166,21 +156,14 @@ NEAR = [("glossy_cornell", 0.02), ("crease", 0.05)]
 @pytest.mark.parametrize(("scene", "d"), NEAR)
 def test_base_and_offset_paths_connect_nearer_than_a_distance_only_where_none_is_demanded(scene, d) -> None:
     demanded, not_demanded = (Connectability(0.2, each) for each in (d, 0.0))
-    assert min(nearest_connections(scene, demanded, 8 * N)) >= d
-    assert max(nearest_connections(scene, not_demanded, 8 * N)) < d
+    assert min(nearest(scene, demanded, 8 * N)) >= d
+    assert max(nearest(scene, not_demanded, 8 * N)) < d
 
 
 def replayed(scene) -> tuple:
     """Shifts by pure replay, and the way back."""
     s = successful(shifts(SCENES[scene](), RULES["replay"], N, seed=5))
     return s, *shift_path(s.t, s.y, s.i)
-
-
-def differing_by_replay(s, back) -> set[str]:
-    """What is not bitwise x's: of the record that came back, of the one that its numbers trace, and of all vertices."""
-    fresh = traced(s.t, back.u, s.i, back.k, back.nee)
-    vertices = (extended_path(s.t, path.u, s.i, path.k, path.nee) for path in (s.x, back))
-    return differing(back, s.x) | differing(fresh, s.x) | differing(*vertices)
 
 
 @pytest.mark.claims("GRIS-A10")

@@ -1,0 +1,92 @@
+"""What gradient figures judge, report or leave open: by the numbers that decide it, not by how they came out."""
+
+import numpy as np
+import pytest
+
+from figures.experiments.pans import floor_views
+from figures.gradient import gpt_f05, gpt_f07, gpt_f10, gpt_f10_3d, gpt_f12
+from restir_ref.gradient_loop import PRIMAL
+
+
+def noise(replicas, n, seed=1):
+    return np.random.default_rng(seed).standard_normal((replicas, n))
+
+
+# ---------------------------------------------------------------- rows have no edges but points
+
+
+def test_edge_pairs_of_a_row_that_see_alike_are_far_apart_or_do_not_exist():
+    assert "15 edge pairs that see alike are 62 pairs apart" in gpt_f10.alike_in("checker")
+    assert gpt_f10.alike_in("occluders") == "no two of its 9 edge pairs see alike"
+
+
+def test_in_space_edge_pairs_stand_side_by_side():
+    (view,) = floor_views(1, gpt_f10_3d.preset_of(gpt_f10.ADAPTIVE), gpt_f10.ADAPTIVE, {})
+    edge = view["dx"].active.reshape(view["dx"].shape)
+    assert (edge[1:] & edge[:-1]).sum() > 30
+
+
+@pytest.mark.parametrize("ratio", [0.1, 10.0])
+def test_edge_pairs_of_a_row_are_reported_whatever_they_are(ratio):
+    errors = noise(64, 1)[:, 0] ** 2 + 1
+    claim = gpt_f10.in_a_row("GPT-F06", (ratio * errors, errors + 1e-9), "checker, aligned / none, edge pairs")
+    assert claim.outcome.passed is None
+    assert "62 pairs apart" in claim.reason
+
+
+# ---------------------------------------------------------------- what is not in the experiment
+
+
+@pytest.mark.parametrize("gain", [0.2, 5.0])
+def test_the_gain_of_a_pair_over_a_pixel_is_not_judged_either_way(gain):
+    a = {f"{arm}.{name}": noise(128, 4) for arm in gpt_f05.ARMS for name in (PRIMAL, "dx")}
+    a["by area.dx"] = a["by area.dx"] / gain
+    first, second = gpt_f05.check(a)
+    assert first.outcome.passed is (gain > 1)
+    assert second.outcome is None
+    assert "> 1 at 95%" in second.reason
+    assert "not in the experiment" in second.reason
+
+
+# ---------------------------------------------------------------- too noisy to tell
+
+
+@pytest.mark.parametrize(
+    ("bias", "error", "passed"),
+    [(0.0, 0.002, True), (0.01, 0.002, False), (0.01, 0.02, None), (0.1, 0.02, False), (0.0, 0.02, None)],
+)
+def test_a_bias_is_seen_or_excluded_or_left_open(bias, error, passed):
+    sample = np.tile([-1.0, 1.0], 64) * error * np.sqrt(127)
+    claim = gpt_f12.told_apart("part", 1 + bias + sample, 1.0)
+    assert (claim.outcome.passed if claim.outcome else None) is passed
+    assert claim.outcome or "too noisy to tell" in claim.reason
+
+
+# ---------------------------------------------------------------- equal rays
+
+
+def maps(rays):
+    """Images of one scene by every method, alike but for their random numbers and their rays."""
+    n = {"primal": gpt_f07.SIDE**2, "dx": gpt_f07.SIDE * (gpt_f07.SIDE - 1)}
+    n["dy"] = n["dx"]
+    found = {}
+    for seed, (method, share) in enumerate(gpt_f07.SHARES.items()):
+        found |= {f"s.{method}.{name}": noise(8 * share, size, seed) for name, size in n.items()}
+        found[f"s.{method}.rays"] = np.array(rays.get(method, 1.0))
+    return found
+
+
+def test_images_and_differences_of_a_method_are_dearer_by_its_rays():
+    cheap, dear = maps({"path tracing": 0.25}), maps({"path tracing": 0.5})
+    for found in (gpt_f07.noise_of, lambda *at: {"dx": gpt_f07.gradient_error(*at)}):
+        one, two = (found(a, "s", "path tracing") for a in (cheap, dear))
+        assert all(two[name] == pytest.approx(2 * one[name]) for name in one)
+
+
+def test_the_better_image_alone_is_the_better_one_at_its_rays():
+    alike = maps({"after": 0.5, "temporal": 1 / 3})
+    for cheaper, other in (("after", "temporal"), ("temporal", "after")):
+        a = alike | {f"s.{cheaper}.rays": alike[f"s.{cheaper}.rays"] / 100}
+        mine = gpt_f07.bands(gpt_f07.at_equal_rays(a, "s", cheaper)["primal"].reshape(-1, 24, 24), 0.01)
+        assert gpt_f07.primal(a, "s")["all frequencies"] == pytest.approx(mine["all frequencies"])
+        assert gpt_f07.rays_of(a, "s", other) == pytest.approx(1)
