@@ -561,7 +561,6 @@ def test_means_of_images_that_share_noise_are_seen_not_to_fall() -> None:
     assert [row.holds for row in alone] == [True, True]
     assert [row.holds for row in shared] == [False, False]
     assert alone[1].error < 0.02
-    assert not any(row.holds for row in averaging.falling("", "", chunks_of(3 + noise[:3]), "image")[1:])
 
 
 def test_probes_of_mutations_run_and_their_truth_is_theirs(monkeypatch) -> None:
