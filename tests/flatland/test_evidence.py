@@ -1,6 +1,7 @@
 """The jobs of `make evidence`: they resume, know what they depend on, run at tiny counts, and see planted mistakes."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -9,11 +10,14 @@ import pytest
 
 from benchmarks import evidence, jobs
 from benchmarks.jobs import (
+    averaging,
     baselines,
     comparing,
     extremes,
+    gradients,
     indirect_references,
     job,
+    map_gradients,
     means,
     mutations,
     offline,
@@ -499,20 +503,64 @@ def test_a_cell_s_error_is_that_of_independent_pixels() -> None:
     assert truth.error == pytest.approx(space_means.cells(0.3 * noise).std(axis=0), rel=0.05)
 
 
-def test_differences_with_the_wrong_sign_or_size_turn_those_of_space_red(monkeypatch) -> None:
-    true = np.linspace(-1, 2, 72)
-    images = {m: [scattered(64, 72, 0.05, part) - 1 + true for part in range(32)] for m in space_gradients.CHUNKS}
+TRUE = np.linspace(-1, 2, 72)
+"""Differences of a square of 9 x 9 pixels, either way."""
 
-    def judged_with(method: str, factor: float) -> list[bool]:
-        done = [
-            ({"method": m}, {"dx": dx * (factor if m == method else 1)}) for m, each in images.items() for dx in each
-        ]
-        return [row.holds for row in space_gradients.judge(done)]
 
-    assert judged_with("with", 1) == [True] * 4
-    assert judged_with("with", -1) == [False, True, True, True]
-    assert judged_with("with, in place", -1) == [True, False, True, True]
-    assert judged_with("after", 1.02) == [True, True, False, True]
+def about(true: Array, chunks: int) -> list[Array]:
+    """Chunks of 64 noisy images of them."""
+    return [scattered(64, len(true), 0.05, part) - 1 + true for part in range(chunks)]
+
+
+def red(job_of, cases: Sequence[dict[str, str]], wrong: int, factor: dict[str, float]) -> set[str]:
+    """What a judge of a square says does not hold when one case's dx or dy, 64 images a chunk, is multiplied."""
+    done = [
+        (case, {name: d * (factor.get(name, 1) if k == wrong else 1) for name in ("dx", "dy")})
+        for k, case in enumerate(cases)
+        for d in about(TRUE, 32)
+    ]
+    return {row.what for row in job_of.judge(done) if not row.holds}
+
+
+@pytest.mark.parametrize("name", ["dx", "dy"])
+@pytest.mark.parametrize("factor", [-1, 1.03])
+def test_differences_with_the_wrong_sign_or_size_turn_their_row_of_a_square_red_and_no_other(name, factor) -> None:
+    methods, modes = [*space_gradients.CHUNKS], [*map_gradients.CASES]
+    for k in range(1, len(methods)):
+        found = red(space_gradients.JOB, [{"method": each} for each in methods], k, {name: factor})
+        assert found == {f"Checker3, moving, {methods[k]}: bias of {name}"}
+    for k in range(1, len(modes)):
+        found = red(map_gradients.JOB, [{"mode": each} for each in modes], k, {name: factor})
+        assert found == {f"map of occluders, {modes[k]}: bias of {name}"}
+    assert not red(space_gradients.JOB, [{"method": each} for each in methods], 1, {})
+
+
+def test_rows_of_gradients_run_and_those_with_the_wrong_sign_and_mistakes_that_are_none_turn_red(monkeypatch) -> None:
+    cases = {("checker", "path tracing", "frame 1"): (12, 0.02), ("occluders", "w = 1/2", "frame 1"): (8, 0.01)}
+    monkeypatch.setattr(gradients, "CASES", cases)
+    assert all(row.holds for row in rows(gradients.JOB, 1.0))
+    monkeypatch.setattr(gradients, "METHODS", {"path tracing": turned, "w = 1/2": gradients.path_traced})
+    assert not any(row.holds for row in rows(gradients.JOB, 1.0))
+
+
+def turned(*of):
+    """A mistake: the difference of the wrong pixel."""
+    found = gradients.path_traced(*of)
+    return found | {"dx": -found["dx"]}
+
+
+def chunks_of(images: Array) -> list[dict[str, Array]]:
+    """Chunks (K, R, n) as the job keeps them."""
+    return [gradients.summed(each, "image") for each in images]
+
+
+def test_means_of_images_that_share_noise_are_seen_not_to_fall() -> None:
+    noise = np.random.default_rng(1).standard_normal((200, 64, 32))
+    alone = averaging.falling("", "", chunks_of(3 + noise), "image")
+    shared = averaging.falling("", "", chunks_of(3 + noise + 0.5 * noise.repeat(2, axis=1)[:, :64]), "image")
+    assert [row.holds for row in alone] == [True, True]
+    assert [row.holds for row in shared] == [False, False]
+    assert alone[1].error < 0.02
 
 
 def test_probes_of_mutations_run_and_their_truth_is_theirs(monkeypatch) -> None:

@@ -56,7 +56,7 @@ def z(values: Array, truth: float) -> float:
     return float((values.mean() - truth) / values.std(ddof=1) * len(values) ** 0.5)
 
 
-@pytest.mark.claims("GPT-E03")
+@pytest.mark.claims("GPT-E03", part="flatland, to 2%")
 def test_differences_of_a_row_by_shifts_with_holes_are_unbiased() -> None:
     right, wrong = probe(one_sided), probe(halves)
     assert abs(z(right, 1)) < 4
