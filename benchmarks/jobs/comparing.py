@@ -5,7 +5,6 @@ Pixels that share samples err together, so what chance allows is measured: the l
 trials in which each chunk's deviation from the mean gets a random sign.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,40 +85,22 @@ def as_truth(found: Sums) -> Truth:
     return Truth(found.mean, found.error, float(image.std(ddof=1) / np.sqrt(found.R)))
 
 
-def judged(
-    claims: str,
-    what: str,
-    found: Sums,
-    truth: Truth,
-    scale: float,
-    eps: float,
-    *,
-    allowed: Callable[[Sums], float] | None = None,
-) -> Row:
-    """Unbiased: |z| <= 4 for the image and its blocks, SE of the image <= eps, all relative to `scale`.
-
-    The pixels' spread is `allowed` as much as by chance, unless told otherwise.
-    """
+def judged(claims: str, what: str, found: Sums, truth: Truth, scale: float, eps: float) -> Row:
+    """Unbiased: |z| <= 4 for the image and its blocks, SE of the image <= eps, all relative to `scale`."""
     means, errors = truth.mean.reshape(BLOCKS, -1).mean(axis=1), truth.error.reshape(BLOCKS, -1)
     by_block = z_scores(found.blocks, means, np.sqrt((errors**2).sum(axis=1)) / errors.shape[1])
     z, error = (
         float(each[0]) for each in z_scores(found.blocks.mean(axis=1)[:, None], means.mean(), truth.image_error)
     )
     worst, block_error = np.abs(by_block[0]).max(), by_block[1].max()
-    wide, chance = spread(found, truth), (allowed or spread_by_chance)(found)
+    wide, chance = spread(found, truth), spread_by_chance(found)
     holds = error <= eps * scale and max(abs(z), worst) <= SIGMA and wide <= chance
     note = (
-        f"z {z:+.2f}; blocks |z| <= {worst:.2f}, SE <= {block_error / scale:.2%}; z-spread {wide:.2f}"
-        f"{f' of {chance:.2f}' if np.isfinite(chance) else ', not judged'}"
+        f"z {z:+.2f}; blocks |z| <= {worst:.2f}, SE <= {block_error / scale:.2%}; z-spread {wide:.2f} of {chance:.2f}"
     )
     bias = float(found.mean.mean() - truth.mean.mean()) / scale
     limit = f"|z| <= {SIGMA:g}, SE <= {eps:.1%}"
     return Row(claims, what, bias, limit, bool(holds), found.R, error / scale, note)
-
-
-def anything(found: Sums) -> float:
-    """No limit, for pixels whose light is in paths so rare that as many images may hold none."""
-    return np.inf
 
 
 def spread(found: Sums, truth: Truth) -> float:

@@ -13,13 +13,13 @@ So rows and their blocks are judged, and the spread of single pairs is told.
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from benchmarks.jobs.averaging import falling, squares
-from benchmarks.jobs.comparing import Sums, Truth, anything, biased, joined, judged, stored, sums
+from benchmarks.jobs.comparing import Sums, Truth, biased, joined, judged, stored, sums
 from benchmarks.jobs.job import Done, Job, Params, Row, parts
 from benchmarks.jobs.signing import signed
 from figures.claims.figure import Arrays
@@ -229,8 +229,12 @@ def images(mode: str, what: str, mine: list[Arrays], eps: float) -> list[Row]:
 
 
 def unbiased(claims: str, what: str, found: Sums, truth: Truth, eps: float) -> Row:
-    """`judged` by the row and its blocks, of differences, which are relative already."""
-    return judged(claims, what, found, truth, 1.0, eps, allowed=anything)
+    """`judged`, of what is relative already, by the row and its blocks: the spread of single pairs is only told.
+
+    Its limit is by chunks of images, of which a pair's rare ones are in none.
+    """
+    together = replace(found, total=found.total.sum(axis=0, keepdims=True))
+    return judged(claims, what, together, truth, 1.0, eps)
 
 
 def true_probe(scene: str) -> Truth:
