@@ -512,7 +512,7 @@ def about(true: Array, chunks: int) -> list[Array]:
     return [scattered(64, len(true), 0.05, part) - 1 + true for part in range(chunks)]
 
 
-def red(job_of, cases: Sequence[dict[str, str]], wrong: int, factor: dict[str, float]) -> set[str]:
+def red_rows(job_of, cases: Sequence[dict[str, str]], wrong: int, factor: dict[str, float]) -> set[str]:
     """What a judge of a square says does not hold when one case's dx or dy, 64 images a chunk, is multiplied."""
     done = [
         (case, {name: d * (factor.get(name, 1) if k == wrong else 1) for name in ("dx", "dy")})
@@ -527,12 +527,12 @@ def red(job_of, cases: Sequence[dict[str, str]], wrong: int, factor: dict[str, f
 def test_differences_with_the_wrong_sign_or_size_turn_their_row_of_a_square_red_and_no_other(name, factor) -> None:
     methods, modes = [*space_gradients.CHUNKS], [*map_gradients.CASES]
     for k in range(1, len(methods)):
-        found = red(space_gradients.JOB, [{"method": each} for each in methods], k, {name: factor})
+        found = red_rows(space_gradients.JOB, [{"method": each} for each in methods], k, {name: factor})
         assert found == {f"Checker3, moving, {methods[k]}: bias of {name}"}
     for k in range(1, len(modes)):
-        found = red(map_gradients.JOB, [{"mode": each} for each in modes], k, {name: factor})
+        found = red_rows(map_gradients.JOB, [{"mode": each} for each in modes], k, {name: factor})
         assert found == {f"map of occluders, {modes[k]}: bias of {name}"}
-    assert not red(space_gradients.JOB, [{"method": each} for each in methods], 1, {})
+    assert not red_rows(space_gradients.JOB, [{"method": each} for each in methods], 1, {})
 
 
 def test_rows_of_gradients_run_and_those_with_the_wrong_sign_and_mistakes_that_are_none_turn_red(monkeypatch) -> None:
