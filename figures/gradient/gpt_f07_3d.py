@@ -382,7 +382,8 @@ def on_most(a: Arrays, pace: str, id_: str, of: str, compared: Compared) -> Clai
 
 WITHIN = (
     "Crops of 32 pixels in which .4 to 2.2% of all pairs are edges: what the paper's rooms have in clutter and texture "
-    "is hardly in them."
+    "is hardly in them. By three caps of frames instead of one, 16 replicas, CB3 by halves and gathered still has 1.6 "
+    "of the variance of dx and dy after ReSTIR and 2.2 of that of path tracing."
 )
 
 
@@ -647,7 +648,7 @@ def of_images(a: Arrays, view: str) -> dict[str, float]:
     return {name: float(each["high"].mean()) for name, each in found.items()}
 
 
-SHORT = ("halves,\nkept", "fifths,\nkept", "halves,\ngath.", "fifths,\ngath.", STILL)
+SHORT = ("1/2\nkept", "1/5\nkept", "1/2\ngath.", "1/5\ngath.", STILL)
 """Cameras, in the order of the bars."""
 
 
@@ -657,7 +658,7 @@ def by_camera(axis: Any, found: Callable[[str], Mapping[str, float]], scene: str
         for j, (name, each) in enumerate(found(f"{camera}.{scene}").items()):
             axis.bar(k + 0.2 * (j - 1.5), each, 0.18, **style.bar(name, label=name if k == 0 else "_"))
     axis.set_xticks(range(len(SHORT)), SHORT)
-    axis.set(yscale="log", xlabel="camera moves by")
+    axis.set(yscale="log", xlabel="fraction of a pixel the camera moves by")
     heights = [bar.get_height() for bar in axis.patches]
     axis.set_ylim(10 ** np.floor(np.log10(min(heights) / 2)), 10 ** np.ceil(np.log10(max(heights))))
     axis.minorticks_off()
