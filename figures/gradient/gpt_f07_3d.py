@@ -383,7 +383,8 @@ def on_most(a: Arrays, pace: str, id_: str, of: str, compared: Compared) -> Clai
 WITHIN = (
     "Crops of 32 pixels in which .4 to 2.2% of all pairs are edges: what the paper's rooms have in clutter and texture "
     "is hardly in them. By three caps of frames instead of one, 16 replicas, CB3 by halves and gathered still has 1.6 "
-    "of the variance of dx and dy after ReSTIR and 2.2 of that of path tracing."
+    "of the variance of dx and dy after ReSTIR and 2.2 of that of path tracing. By the mean size of errors, which "
+    "outliers do not carry, differences of pair reuse are the smallest in Ajar3 and Checker3 where history is gathered."
 )
 
 
