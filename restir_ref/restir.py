@@ -24,6 +24,8 @@ M_CAP = 20
 def initial(here: Pixels, chance: Chance, M: int = 1) -> Reservoirs:
     """RIS: resample M independent sets of candidates into one sample of confidence 1.  [GRIS Eq. 1-6; 6.3]
 
+    All of them are held until one is chosen; `windows.windowed` bounds that for images of any size.
+
     >>> import numpy as np
     >>> from restir_ref import Live, Pixels, initial, shade
     >>> from toy1d import two_pixels
