@@ -464,8 +464,9 @@ def sizes(a: Arrays, view: str, method: str) -> Array:
 
 
 def among(a: Arrays, view: str, method: str, at: Mapping[str, Array]) -> Array:
-    """Variance of dx and dy of some pairs, of every replica; (R,)."""
-    return spread([a[f"{view}.{method}.{name}"][:, which] for name, which in at.items() if which.any()])
+    """Variance of dx and dy of some pairs, of every replica, nothing where there are none; (R,)."""
+    found = [a[f"{view}.{method}.{name}"][:, which] for name, which in at.items() if which.any()]
+    return spread(found) if found else np.zeros(len(a[f"{view}.{method}.dx"]))
 
 
 def images(a: Arrays, scene: str) -> list[Claim]:

@@ -248,6 +248,15 @@ def test_a_scene_counts_only_where_all_of_its_comparisons_are_met(monkeypatch):
         assert space.sorted_scenes({}, HALVES, lambda a, view, of=compared: of)[kind] == SCENES
 
 
+def test_variance_is_that_of_the_pairs_that_are_asked_and_nothing_where_there_are_none():
+    noise = np.random.default_rng(1).normal(size=(8, 6))
+    a = {f"{VIEW}.with.dx": noise, f"{VIEW}.with.dy": 2 * noise}
+    some, none = np.arange(6) < 2, np.zeros(6, dtype=bool)
+    found = space.among(a, VIEW, "with", {"dx": some, "dy": none}).mean()
+    assert found == pytest.approx(noise[:, :2].var(axis=0, ddof=1).mean())
+    assert not space.among(a, VIEW, "with", {"dx": none, "dy": none}).any()
+
+
 def test_too_few_replicas_judge_nothing():
     a = {f"{HALVES}.CB3.with.dx": np.zeros((8, 4)), f"{space.STILL}.CB3.with.dx": np.zeros((8, 4))}
     for each in space.JUDGED:
