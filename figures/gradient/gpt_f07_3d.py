@@ -660,7 +660,7 @@ def by_camera(axis: Any, found: Callable[[str], Mapping[str, float]], scene: str
         for j, (name, each) in enumerate(found(f"{camera}.{scene}").items()):
             axis.bar(k + 0.2 * (j - 1.5), each, 0.18, **style.bar(name, label=name if k == 0 else "_"))
     axis.set_xticks(range(len(SHORT)), SHORT)
-    axis.set(yscale="log", xlabel="fraction of a pixel the camera moves by")
+    axis.set(yscale="log", xlabel="moves by (pixels)")
     heights = [bar.get_height() for bar in axis.patches]
     axis.set_ylim(10 ** np.floor(np.log10(min(heights) / 2)), 10 ** np.ceil(np.log10(max(heights))))
     axis.minorticks_off()

@@ -102,6 +102,10 @@ FIRST = (
 )
 
 
+LOOKS: Mapping[str, int] = MappingProxyType({"same sign": 0, "one reservoir": 2})
+"""As in GPT-F09, which has a third arm between them."""
+
+
 def draw(a: Arrays) -> "Picture":
     """dx of one replica by either arm, and their errors at equal samples and at equal rays."""
     picture, axes = style.panels(1, 3, width=3.4, height=3.0)
@@ -116,7 +120,8 @@ def draw(a: Arrays) -> "Picture":
     right = axes[0, 2]
     for k, arm in enumerate(ARMS):
         both = error(a, arm, VIEW).mean() * np.array([1, a[f"{VIEW}.{arm}.rays"] / a[f"{VIEW}.same sign.rays"]])
-        look = {"color": style.nth(k)["color"], "hatch": style.HATCHES[k], "edgecolor": style.PAPER}
+        n = LOOKS[arm]
+        look = {"color": style.nth(n)["color"], "hatch": style.HATCHES[n], "edgecolor": style.PAPER}
         right.bar(np.arange(2) + 0.35 * (k - 0.5), both, 0.33, label=arm, **look)
     right.set_xticks([0, 1], ["equal samples", "equal rays"])
     right.set(xlabel="what is equal", ylabel="variance of dx and dy (radiance$^2$)", title="Mean over pairs, replicas")
