@@ -640,7 +640,7 @@ def draw(a: Arrays) -> "Picture":
         row[2].set(ylabel="variance of dx, dy (radiance$^2$)", title="differences")
         by_camera(row[3], lambda view: of_images(a, view), scene)
         row[3].set(ylabel="power above alpha (radiance$^2$)", title="L2 images")
-    style.below(axes[-1, 3], ncols=2)
+    style.below(axes[-1, 3], ncols=2, borderaxespad=1.5)
     return picture
 
 
