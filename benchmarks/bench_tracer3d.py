@@ -1,8 +1,8 @@
 """What path tracing in space costs beside Mitsuba 3: paths per CPU-second of one thread, as ratios.
 
 Both trace the same crop of CB3 at depth 4, by turns in one run; the least CPU time of each counts, for others on the
-machine only add to it.  Exits with 1 if a requirement is missed, which Embree's is: of a path's time here more than
-half is shading, for which Mitsuba takes next to nothing, and hits are refined in double precision.  Without Mitsuba
+machine only add to it.  Exits with 1 if a requirement is missed, which Embree's is: shading alone takes half of a
+path's time here, nearly as long as Mitsuba for all of it, and hits are refined in double precision.  Without Mitsuba
 nothing is measured.  Takes 40 s.
 """
 

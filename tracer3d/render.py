@@ -32,7 +32,7 @@ MOST = 4 * 2**30
 """Bytes that a picture may need."""
 
 DEEPEST = 100
-"""Scattering vertices that a path may have: with lights to sample at each it is an image of nothing long before."""
+"""Scattering vertices that a path may have, as in scene files."""
 
 SURFACES = 10_000
 """So many triangles and spheres at most are asked by brute force."""

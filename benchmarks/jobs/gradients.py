@@ -8,12 +8,11 @@ Hazard: differences that are almost nothing have long tails, and then too few im
 large without a bias.  Behind the posts a twelfth of a pair's difference is in paths that one of its pixels has alone,
 about one in 6000.  Beside the border of the floor, of a pair that moves, -110 times the row's mean stands once in 4000
 images against +.02 in all others: what its square has of the border's own pair is chosen rarely, and weighs as much.
-So rows and their blocks are judged, and the spread of single pairs is told.
 """
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -223,18 +222,13 @@ def images(mode: str, what: str, mine: list[Arrays], eps: float) -> list[Row]:
     """What is asked of the images of the floor in a mode."""
     claims, rows = "GPT-A13, COM-B05", []
     if mode in IMAGES:
-        mean = joined(mine, "image")
-        rows.append(judged(claims, f"{what}: bias of the image", mean, true_image(FLOOR[0]), 1.0, eps))
+        rows.append(unbiased(claims, f"{what}: bias of the image", joined(mine, "image"), true_image(FLOOR[0]), eps))
     return rows + [row for each in AVERAGED.get(mode, ()) for row in falling("GPT-A13", f"{what}, {each}", mine, each)]
 
 
 def unbiased(claims: str, what: str, found: Sums, truth: Truth, eps: float) -> Row:
-    """`judged`, of what is relative already, by the row and its blocks: the spread of single pairs is only told.
-
-    Its limit is by chunks of images, of which a pair's rare ones are in none.
-    """
-    together = replace(found, total=found.total.sum(axis=0, keepdims=True))
-    return judged(claims, what, together, truth, 1.0, eps)
+    """`judged`, of what is relative already."""
+    return judged(claims, what, found, truth, 1.0, eps)
 
 
 def true_probe(scene: str) -> Truth:

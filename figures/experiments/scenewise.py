@@ -12,16 +12,29 @@ Pair = tuple[Array, Array]
 
 MET, CONTRARY, UNDECIDED = "met", "contrary", "undecided"
 
+Sorted = Mapping[str, Sequence[str]]
+"""Scenes that are met, contrary and undecided."""
 
-def standing(pairs: Sequence[Pair], limit: float) -> str:
-    """Of one scene: met if the 95% intervals of all ratios end below the limit, contrary if one begins at it or above.
+
+def standing(limits: Sequence[tuple[Pair, float]]) -> str:
+    """Of one scene: met if all 95% intervals of its ratios end below their limits, contrary if one begins above.
 
     Anything else is undecided: more replicas would tell.
     """
-    ends = [criteria.ratio_interval(*pair)[:2] for pair in pairs]
-    if all(high < limit for _, high in ends):
+    ends = [(criteria.ratio_interval(*pair)[:2], limit) for pair, limit in limits]
+    if all(high < limit for (_, high), limit in ends):
         return MET
-    return CONTRARY if any(low >= limit for low, _ in ends) else UNDECIDED
+    return CONTRARY if any(low >= limit for (low, _), limit in ends) else UNDECIDED
+
+
+def sorted_by(standings: Mapping[str, str]) -> Sorted:
+    """The names of scenes by how they stand."""
+    return {kind: [name for name, each in standings.items() if each == kind] for kind in (MET, CONTRARY, UNDECIDED)}
+
+
+def words(scenes: Sorted) -> str:
+    """Which scenes stand how."""
+    return "; ".join(f"{kind}: {', '.join(names)}" for kind, names in scenes.items() if names)
 
 
 def in_enough(id_: str, scenes: Mapping[str, Sequence[Pair]], asked: tuple[float, int], part: str, why: str) -> Claim:
@@ -30,11 +43,8 @@ def in_enough(id_: str, scenes: Mapping[str, Sequence[Pair]], asked: tuple[float
     short = next((few(pair[0]) for pairs in scenes.values() for pair in pairs if few(pair[0])), "")
     if short:
         return Claim(id_, None, part, reason=short)
-    found = {name: standing(pairs, limit) for name, pairs in scenes.items()}
-    by = {each: [name for name in found if found[name] == each] for each in (MET, CONTRARY, UNDECIDED)}
-    measured = "; ".join(f"{each}: {', '.join(names)}" for each, names in by.items() if names)
-    rule = f"ratio < {limit:g} at 95% in at least {least} of {len(found)}"
-    decided = len(by[MET]) >= least or len(found) - len(by[CONTRARY]) < least
-    if decided:
-        return Claim(id_, criteria.Outcome(measured, rule, len(by[MET]) >= least), part, reason=why)
-    return Claim(id_, None, part, reason=f"Undecided ({measured}; asked {rule}).  {why}")
+    by = sorted_by({name: standing([(pair, limit) for pair in pairs]) for name, pairs in scenes.items()})
+    rule = f"ratio < {limit:g} at 95% in at least {least} of {len(scenes)}"
+    if len(by[MET]) >= least or len(scenes) - len(by[CONTRARY]) < least:
+        return Claim(id_, criteria.Outcome(words(by), rule, len(by[MET]) >= least), part, reason=why)
+    return Claim(id_, None, part, reason=f"Undecided ({words(by)}; asked {rule}).  {why}")

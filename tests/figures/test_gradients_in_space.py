@@ -8,6 +8,7 @@ import pytest
 
 from figures.experiments.following import followed, views_of
 from figures.experiments.gradients import ADAPTIVE
+from figures.experiments.scenewise import CONTRARY, MET
 from figures.experiments.views import setting, standard
 from figures.gradient import gpt_f01 as row
 from figures.gradient import gpt_f07_3d as space
@@ -237,15 +238,15 @@ def test_a_claim_holds_that_holds_in_two_of_three_scenes_by_one_option(monkeypat
 def test_it_fails_only_where_replicas_tell_that_it_does(monkeypatch, kept, gathered):
     found = judged(monkeypatch, {"kept": kept, "gathered": gathered})
     assert found.outcome is None
-    assert "Undecided: kept: " in found.reason
+    assert "Undecided. kept: " in found.reason
 
 
 def test_a_scene_counts_only_where_all_of_its_comparisons_are_met(monkeypatch):
     low, high = (size * (1 + 0.01 * np.random.default_rng(1).normal(size=64)) for size in (0.9, 1.1))
     monkeypatch.setattr(space, "scenes_of", lambda a: SCENES)
     half = [space.Comparison("a", low, high, 1.0), space.Comparison("b", low, high, 0.8)]
-    for compared, kind in ((half, space.CONTRARY), (half[:1], space.MET)):
-        assert space.sorted_scenes({}, HALVES, lambda a, view, of=compared: of)[kind] == SCENES
+    for compared, kind in ((half, CONTRARY), (half[:1], MET)):
+        assert space.by_standing({}, HALVES, lambda a, view, of=compared: of)[kind] == SCENES
 
 
 def test_variance_is_that_of_the_pairs_that_are_asked_and_nothing_where_there_are_none():
@@ -255,6 +256,39 @@ def test_variance_is_that_of_the_pairs_that_are_asked_and_nothing_where_there_ar
     found = space.among(a, VIEW, "with", {"dx": some, "dy": none}).mean()
     assert found == pytest.approx(noise[:, :2].var(axis=0, ddof=1).mean())
     assert not space.among(a, VIEW, "with", {"dx": none, "dy": none}).any()
+
+
+def test_the_mean_size_of_errors_is_told_of_dx_and_dy_together():
+    a = {f"{VIEW}.with.dx": np.array([[1.0, 2], [3, 2]]), f"{VIEW}.with.dy": np.array([[0.0], [6]])}
+    assert np.allclose(space.sizes(a, VIEW, "with"), [0.5 + 3, 0.5 + 3])
+
+
+def test_sizes_are_sorted_scene_by_scene_against_both_others(monkeypatch):
+    noise = 1 + 0.01 * np.random.default_rng(1).normal(size=(3, 64))
+    small = {"CB3": {"with": 0.5}, "Ajar3": {"with": 0.9, "after": 0.5}, "Checker3": {"with": 1.0}}
+
+    def sizes(a, view, method):
+        return small[view.split(".")[1]].get(method, 1.0) * noise[list(space.METHODS).index(method)]
+
+    monkeypatch.setattr(space, "sizes", sizes)
+    monkeypatch.setattr(space, "scenes_of", lambda a: SCENES)
+    told = space.smallest({f"{HALVES}.CB3.with.dx": np.zeros((64, 4))}, space.HALVES).outcome
+    assert told.passed is None
+    assert told.measured == ". ".join(f"{o}: met: CB3; contrary: Ajar3; undecided: Checker3" for o in space.OPTIONS)
+
+
+def test_a_camera_at_rest_is_judged_at_equal_rays_against_both_others_alone(monkeypatch):
+    noise = 1 + 0.01 * np.random.default_rng(1).normal(size=(3, 64))
+    rays = {"with": 0.5, "after": 1.0, "path tracing": 0.7}  # after / path tracing is above the limit
+
+    def error(a, view, method, cost=space.dearer):
+        return (rays[method] if cost is space.dearer else 1.0) * noise[list(space.METHODS).index(method)]
+
+    monkeypatch.setattr(space, "gradient_error", error)
+    monkeypatch.setattr(space, "scenes_of", lambda a: SCENES)
+    assert space.at_rest({}).outcome.passed is True
+    monkeypatch.setitem(rays, "path tracing", 0.55)
+    assert space.at_rest({}).outcome.passed is False
 
 
 def test_too_few_replicas_judge_nothing():

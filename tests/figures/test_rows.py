@@ -97,15 +97,15 @@ LOW, HIGH, OPEN = pair(0.5), pair(0.9), pair(0.79, noise=0.5)
 
 
 def test_a_scene_is_met_by_all_its_comparisons_and_contrary_by_one():
-    assert standing([LOW, LOW], 0.8) == MET
-    assert standing([LOW, HIGH], 0.8) == standing([OPEN, HIGH], 0.8) == CONTRARY
-    assert standing([LOW, OPEN], 0.8) == UNDECIDED
+    assert standing([(LOW, 0.8), (LOW, 0.8)]) == MET
+    assert standing([(LOW, 0.8), (HIGH, 0.8)]) == standing([(OPEN, 0.8), (HIGH, 0.8)]) == CONTRARY
+    assert standing([(LOW, 0.8), (OPEN, 0.8)]) == UNDECIDED
     low, high, _ = ratio_interval(*OPEN)
     assert low < 0.8 <= high
 
 
 def test_a_scene_of_no_number_is_undecided():
-    assert standing([(np.full(64, np.nan), LOW[1])], 0.8) == UNDECIDED
+    assert standing([((np.full(64, np.nan), LOW[1]), 0.8)]) == UNDECIDED
 
 
 @pytest.mark.parametrize(
