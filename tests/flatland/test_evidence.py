@@ -26,6 +26,7 @@ from benchmarks.jobs import (
     report,
     retracing,
     roundtrips,
+    signing,
     space_gradients,
     space_means,
     space_offline,
@@ -574,3 +575,15 @@ def test_probes_of_mutations_run_and_their_truth_is_theirs(monkeypatch) -> None:
         assert joined([found], f"constant, {stage}").mean.mean() == pytest.approx(right, rel=0.1)
     assert len(found) == 3 * 2 * len(mutations.PROBES)
     assert {params["case"] for params in mutations.chunks(0.01)} == {*mutations.EVERY, *mutations.CHUNKS}
+
+
+def test_differences_that_telescope_to_nothing_have_a_mean_of_one_by_their_signs() -> None:
+    true = np.array([0.5, -2.0, 1.5])
+    assert true.sum() == 0
+    assert signing.signed(true[None], true).mean() == pytest.approx(1)
+
+
+def test_variances_of_means_of_half_of_all_images_are_unbiased() -> None:
+    images = 3 + np.random.default_rng(1).standard_normal((32, 20_000))
+    found = averaging.ratios(averaging.squares(images)[None], images.sum(axis=0)[None], len(images))
+    assert np.allclose(found, 0, atol=0.05)
