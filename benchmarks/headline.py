@@ -10,7 +10,8 @@ loading not at all.  References are path traced by Mitsuba; their variance is su
 crops were fixed before anything was measured: a scene's inset, and four around the points of thirds of the film.
 
 The paper's offline figures measure the error of indirect light only [GRIS 9.3].  Mitsuba's is its picture less that of
-the same paths cut off behind direct light, which costs it nothing here.
+the same paths cut off behind direct light, which costs it nothing here.  That takes out lamps that the camera sees as
+well, which ours keeps; no crop sees one.
 
 Mitsuba runs as `llvm_ad_rgb`, which needs LLVM 17 or newer (DRJIT_LIBLLVM_PATH names one); where there is none it is
 `scalar_rgb`, and the table says so.  Exits with 1 if a requirement is missed.
