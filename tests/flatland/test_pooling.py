@@ -1,0 +1,192 @@
+"""Rules about pairs with rare paths, on data whose truth is exact: how often they are wrong, and what they see."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from benchmarks.jobs import comparing, gradients, row_gradients
+from benchmarks.jobs.comparing import Sums, Truth, spread, spread_by_chance
+from benchmarks.jobs.job import Row
+from benchmarks.jobs.pooling import among, pooled, pooled_by_chance
+from restir_ref.batch import Array
+
+R, K, PAIRS = 64, 40, 100
+"""Images of a chunk, chunks, pairs: 2560 images."""
+
+LIGHT = np.where(np.arange(PAIRS) < 50, 1.0, 0.25)
+"""Of the pairs; their noise is in proportion."""
+
+RARE, EVENT, SCATTER = 1 / 6000, 50.0, 0.08
+"""How often an image holds a rare path, what that adds to a pair's difference, and the noise of all others.
+
+Of a difference of .1 a twelfth is rare, as behind the posts of the occluders.
+"""
+
+ERROR = np.sqrt((SCATTER**2 + EVENT**2 * RARE) / (R * K))
+"""The standard error of a pair, over its light."""
+
+
+def experiment(seed: int, bias: Array | float = 0.0) -> Sums:
+    """Chunks whose expectation is the bias, exactly: normal noise and a binomial number of rare paths.
+
+    Squares are those of the events and of expected noise, which hardly varies.
+    """
+    rng = np.random.default_rng(seed)
+    events = rng.binomial(R, RARE, (K, PAIRS))
+    total = EVENT * (events - R * RARE) + SCATTER * np.sqrt(R) * rng.standard_normal((K, PAIRS))
+    square = EVENT**2 * events.sum(axis=0) + R * K * ((EVENT * RARE) ** 2 + SCATTER**2)
+    return Sums(np.zeros((R * K, 8)), LIGHT * (total + R * np.asarray(bias)), LIGHT**2 * square)
+
+
+NOTHING = Truth(np.zeros(PAIRS), np.zeros(PAIRS), 0.0)
+
+
+def by_z(found: Sums) -> bool:
+    """The rule of `judged`: every pair over its own standard error."""
+    return spread(found, NOTHING) > spread_by_chance(found)
+
+
+def by_pool(found: Sums) -> bool:
+    """The rule of rows of gradients."""
+    return pooled(found, NOTHING, 1 / LIGHT) > pooled_by_chance(found, 1 / LIGHT)
+
+
+def rate(says: Callable[[Sums], bool], bias: Array | float = 0.0, count: int = 40) -> float:
+    """Share of experiments that a rule calls biased."""
+    return float(np.mean([says(experiment(seed, bias)) for seed in range(count)]))
+
+
+@pytest.fixture(autouse=True)
+def few_flips(monkeypatch) -> None:
+    """A tenth of the trials, in both rules: a stricter limit, of one in a thousand."""
+    monkeypatch.setattr("benchmarks.jobs.pooling.FLIPS", 1000)
+    monkeypatch.setattr(comparing, "FLIPS", 1000)
+
+
+def test_pairs_with_rare_paths_are_called_biased_by_their_own_errors_and_not_by_pooled_ones() -> None:
+    assert rate(by_z) > 0.9
+    assert rate(by_pool, count=300) <= 0.01
+
+
+def test_the_squared_pooled_error_is_one_in_the_mean_whatever_the_tails() -> None:
+    """Of squared z-scores it is ten times as much."""
+    S2, z2 = np.array(
+        [(pooled(each, NOTHING, 1 / LIGHT) ** 2, spread(each, NOTHING) ** 2) for each in map(experiment, range(300))]
+    ).T
+    assert abs(S2.mean() - 1) < 4 * S2.std() / np.sqrt(300) < 0.05
+    assert z2.mean() > 5
+
+
+ALTERNATING = (-1.0) ** np.arange(PAIRS)
+"""Biases that cancel in rows and blocks."""
+
+
+def test_both_rules_see_a_bias_of_the_pairs_noise_that_cancels_in_the_mean() -> None:
+    for says in (by_z, by_pool):
+        assert rate(says, 1.2 * ERROR * ALTERNATING, count=20) > 0.9
+
+
+@pytest.mark.parametrize("pair", [3, 90])
+def test_a_bias_of_one_pair_is_seen_from_ten_of_the_pairs_errors_on_but_three_are_too_few(pair) -> None:
+    """In the bright half and in the dark one alike."""
+    at = np.arange(PAIRS) == pair
+    assert rate(by_pool, 12 * ERROR * at, count=20) > 0.9
+    assert rate(by_pool, 3 * ERROR * at, count=20) < 0.1
+
+
+def test_without_weights_the_bright_half_hides_what_is_wrong_in_the_dark_one() -> None:
+    """A mistake: all pairs' errors as they are."""
+    bias = 1.5 * ERROR * ALTERNATING * (LIGHT < 1)
+    assert rate(by_pool, bias, count=20) > 0.9
+    unweighted = lambda found: pooled(found, NOTHING, 1 + 0 * LIGHT) > pooled_by_chance(found, 1 + 0 * LIGHT)  # noqa: E731
+    assert rate(unweighted, bias, count=20) < 0.5
+
+
+def test_the_limit_knows_of_pairs_that_err_together() -> None:
+    """A mistake: pairs taken for independent."""
+    rng = np.random.default_rng(1)
+    shared = rng.standard_normal((K, 1)) + 0.3 * rng.standard_normal((K, PAIRS))
+    alone = 1.05 * rng.standard_normal((K, PAIRS))
+    one = np.ones(PAIRS)
+    limits = [pooled_by_chance(Sums(np.zeros((K, 8)), each, one), one) for each in (shared, alone)]
+    assert limits[0] > 2.5
+    assert limits[1] < 1.4
+
+
+def test_few_chunks_set_no_limit_and_pixels_can_be_left_out() -> None:
+    found = experiment(1)
+    some = np.arange(PAIRS) % 3 == 0
+    assert pooled_by_chance(Sums(found.blocks, found.total[:15], found.square), 1 / LIGHT) == np.inf
+    assert np.isfinite(pooled_by_chance(Sums(found.blocks, found.total[:16], found.square), 1 / LIGHT))
+    for name in ("mean", "error"):
+        assert getattr(among(found, some), name) == pytest.approx(getattr(found, name)[some], rel=1e-12)
+
+
+def test_edges_of_rows_are_the_borders_of_their_scenes_and_what_is_beside_them_is_not_away() -> None:
+    for scene, edges in {"checker": [63], "occluders": [32, 33, 58, 59]}.items():
+        edge, away, light = row_gradients.kinds(scene)
+        assert edge.tolist() == edges
+        assert set(np.flatnonzero(~away)) == {e + k for e in edges for k in range(-4, 5)}
+        assert light.mean() == pytest.approx(1)
+
+
+# ---------------------------------------------------------------- rows
+
+CASE = "occluders", "path tracing", "frame 1"
+
+
+def judged_row(monkeypatch, wrong: Array | float = 0.0, rare: float = 0.0) -> Row:
+    """What the job says of 1024 noisy images about the true differences, off by `wrong`, with rare events in all."""
+    for module in (gradients, row_gradients):
+        monkeypatch.setattr(module, "CASES", {CASE: (16, 0.05)})
+    rng, true = np.random.default_rng(1), gradients.true_probe(CASE[0]).mean
+    light, chunks = row_gradients.kinds(CASE[0])[2], []
+    for params in row_gradients.chunks(1.0):
+        events = rare * ((rng.random((R, len(true))) < RARE) - RARE)
+        images = true + light * (0.3 * rng.standard_normal((R, len(true))) + events) + wrong
+        chunks.append((params, gradients.summed(images, "dx")))
+    (row,) = row_gradients.judge(chunks)
+    return row
+
+
+def numbers(row: Row) -> tuple[float, float, float]:
+    """The z-spread, the pooled error and the largest |z| of edges over what is allowed, as the note tells them."""
+    *_, spreads, pool, edges = row.note.split("; ")
+    (a, b), (c, d) = ([float(each) for each in part.split()[1::2]] for part in (spreads, pool))
+    return a / b, c / d, float(edges.split()[-1]) / 4
+
+
+def test_rows_hold_without_bias_also_where_pairs_have_rare_paths(monkeypatch) -> None:
+    plain, skewed = (judged_row(monkeypatch, rare=each) for each in (0.0, 60.0))
+    assert plain.holds
+    assert skewed.holds
+    assert max(numbers(plain)) < 1 < numbers(skewed)[0]
+
+
+PAIR = np.arange(gradients.PAIRS)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "by"),
+    [
+        (0.1 * ((PAIR == 32) * 1.0 - (PAIR == 33)), "edges"),
+        (0.03 * (-1.0) ** PAIR * (abs(PAIR - 90) < 20), "pooled"),
+    ],
+    ids=["two edges that cancel", "pairs that cancel"],
+)
+def test_rows_turn_red_by_edges_or_by_what_is_away_from_them(monkeypatch, wrong, by) -> None:
+    row = judged_row(monkeypatch, wrong)
+    assert not row.holds
+    _, pool, edges = numbers(row)
+    assert {"pooled": pool, "edges": edges}[by] > 1
+    assert (edges > 1) is (by == "edges")
+
+
+def test_images_of_rows_are_not_those_that_the_rule_before_was_seen_to_fail_on() -> None:
+    assert all(params["series"] == row_gradients.SERIES for params in row_gradients.chunks(0.01))
+    before = {(p["scene"], p["method"], p["mode"]) for p in gradients.chunks(0.01)}
+    assert before == {(p["scene"], p["method"], p["mode"]) for p in row_gradients.chunks(0.01)}
+    for case, (count, eps) in gradients.CASES.items():
+        assert row_gradients.CASES[case][0] >= count
+        assert row_gradients.CASES[case][1] <= eps
