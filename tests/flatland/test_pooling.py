@@ -114,6 +114,25 @@ def test_the_limit_knows_of_pairs_that_err_together() -> None:
     assert limits[1] < 1.4
 
 
+def test_pooled_errors_are_sums_of_squares_with_the_truth_s_own_errors_and_weights() -> None:
+    """By hand: means 2 and 3, standard errors 1 and 2, truths 1 and 0, their errors 2 and 1, weights 1 and 2."""
+    squares = np.array([2 * (1 + 2**2), 2 * (4 + 3**2)])
+    found = Sums(np.zeros((2, 8)), np.array([[4.0, 6.0]]), squares)
+    assert (found.mean.tolist(), found.error.tolist()) == ([2, 3], [1, 2])
+    truth = Truth(np.array([1.0, 0]), np.array([2.0, 1]), 0.0)
+    assert pooled(found, truth, np.array([1.0, 2])) == pytest.approx(np.sqrt((1 + 36) / (5 + 20)))
+
+
+def test_weights_are_units_of_the_pairs() -> None:
+    """Numbers multiplied by them have the same limit without them."""
+    found = experiment(2)
+    scaled = Sums(found.blocks, found.total / LIGHT, found.square / LIGHT**2)
+    one = np.ones(PAIRS)
+    assert pooled_by_chance(found, 1 / LIGHT) == pytest.approx(pooled_by_chance(scaled, one))
+    assert pooled_by_chance(found, one) != pytest.approx(pooled_by_chance(scaled, one))
+    assert pooled(found, NOTHING, 1 / LIGHT) == pytest.approx(pooled(scaled, NOTHING, one))
+
+
 def test_few_chunks_set_no_limit_and_pixels_can_be_left_out() -> None:
     found = experiment(1)
     some = np.arange(PAIRS) % 3 == 0
@@ -172,15 +191,16 @@ PAIR = np.arange(gradients.PAIRS)
     [
         (0.1 * ((PAIR == 32) * 1.0 - (PAIR == 33)), "edges"),
         (0.03 * (-1.0) ** PAIR * (abs(PAIR - 90) < 20), "pooled"),
+        (0.03 * (-1.0) ** PAIR * (abs(PAIR - 45.5) < 8), "pooled"),
+        (0.1 * (abs(PAIR - 30) < 2), "row"),
     ],
-    ids=["two edges that cancel", "pairs that cancel"],
+    ids=["two edges that cancel", "bright pairs that cancel", "dark pairs that cancel", "pairs beside an edge"],
 )
-def test_rows_turn_red_by_edges_or_by_what_is_away_from_them(monkeypatch, wrong, by) -> None:
+def test_rows_turn_red_by_edges_by_what_is_away_from_them_or_by_blocks(monkeypatch, wrong, by) -> None:
     row = judged_row(monkeypatch, wrong)
     assert not row.holds
     _, pool, edges = numbers(row)
-    assert {"pooled": pool, "edges": edges}[by] > 1
-    assert (edges > 1) is (by == "edges")
+    assert (pool > 1, edges > 1) == (by == "pooled", by == "edges")
 
 
 def test_images_of_rows_are_not_those_that_the_rule_before_was_seen_to_fail_on() -> None:
