@@ -102,4 +102,7 @@ def together(found: Sums) -> Sums:
     return replace(found, total=found.total.sum(axis=0, keepdims=True))
 
 
-JOB = replace(RENDERED, chunks=chunks, compute=compute, judge=judge)
+ASKS = f"""{RENDERED.asks}, images of series {SERIES}: the row, its blocks and every edge pair by |z|, pairs away from
+edges by their pooled error; the z-spread is told, and judges images only""".replace("\n", " ")
+
+JOB = replace(RENDERED, asks=ASKS, chunks=chunks, compute=compute, judge=judge)
