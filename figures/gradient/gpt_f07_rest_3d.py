@@ -297,10 +297,10 @@ def draw(a: Arrays) -> "Picture":
     scenes = scenes_of(a)
     picture, axes = style.panels(len(scenes), 3, width=3.6, height=2.5)
     for row, scene in zip(axes, scenes, strict=True):
-        shown(row[0], a, f"{WHOLE}.{scene}", "whole view", "film")
-        shown(row[1], a, f"{STILL}.{scene}", "crop of the virtual film", "crop")
+        shown(row[0], a, f"{WHOLE}.{scene}", "whole view (circle: crop)", "film")
+        shown(row[1], a, f"{STILL}.{scene}", "crop", "crop")
         mark(row[0], a, scene)
-        lines(row[2], a, scene)
+        bars(row[2], a, scene)
     style.below(axes[-1, 2], ncols=2, borderaxespad=0.5)
     return picture
 
@@ -321,32 +321,41 @@ def mark(axis: "Axes", a: Arrays, scene: str) -> None:
     x, y = ((at + length / 2) for at, length in ((sensor.left, sensor.width), (sensor.top, sensor.height)))
     columns, rows = a["film"].tolist()
     place = (x / FILM[0] * columns - 0.5, y / FILM[1] * rows - 0.5)
-    axis.plot(*place, "o", ms=9, mfc="none", mec=style.PAPER, mew=3)
-    axis.plot(*place, "o", ms=9, mfc="none", mec=style.INK, mew=1)
+    for colour, width in ((style.PAPER, 3.5), (style.INK, 1.5)):
+        axis.plot(*place, marker="o", markevery=1, ms=9, mfc="none", mec=colour, mew=width)
 
 
-def lines(axis: "Axes", a: Arrays, scene: str) -> None:
-    """Ratios by camera, at equal rays at rest and at the paper's counts in motion; both limits that are asked for."""
+TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
+"""Ratios that an axis may name."""
+
+
+def bars(axis: "Axes", a: Arrays, scene: str) -> None:
+    """Ratios by camera, at equal rays at rest and at the paper's counts in motion, as bars that begin at 1."""
+    ends = [1.0]
     for k, camera in enumerate(ROWS):
         for j, (method, pair) in enumerate(zip(OTHERS, pairs(a, camera, scene), strict=True)):
-            middle, ends = interval(*pair)
-            look = style.look(method, label=f"over {method}" if k == 0 else "_", ls="")
-            axis.errorbar(middle, k + 0.3 * (j - 0.5), xerr=ends, capsize=2, **look)
-    for limit in (0.8, 1.0):
-        axis.axvline(limit, color=style.INK, lw=0.8, ls=":" if limit < 1 else "-")
+            at, middle, (low, high) = k + 0.36 * (j - 0.5), *interval(*pair)
+            look = style.bar(method, label=f"over {method}" if k == 0 else "_")
+            axis.barh(at, middle - 1, 0.34, left=1, **look)
+            axis.plot([low, high], [at, at], color=style.INK, lw=1.2, marker="|", markevery=1, ms=5)
+            ends += [low, high]
+    axis.axvline(0.8, color=style.INK, lw=1.0, ls=":", label="0.8, what is asked")
     axis.set_yticks(range(len(ROWS)), list(ROWS.values()))
-    axis.set(xscale="log", ylim=(len(ROWS) - 0.5, -0.5), title=f"{scene}, dx and dy")
-    axis.set(xlabel="variance of pair reuse over others' (.8 dotted)")
+    low, high = min(ends) / 1.3, max(ends) * 1.3
+    axis.set(xscale="log", xlim=(low, high), ylim=(len(ROWS) - 0.4, -0.6), title=f"{scene}, dx and dy")
+    axis.minorticks_off()
+    axis.set_xticks(named := [each for each in TICKS if low < each < high], [f"{each:g}" for each in named])
+    axis.set(xlabel="variance of pair reuse, over others'")
     axis.grid(axis="y", visible=False)
 
 
-def interval(ours: Array, theirs: Array) -> tuple[float, list[list[float]]]:
-    """The ratio of the means, and how far its 95% interval reaches to either side; nothing for too few replicas."""
-    middle = float(ratio(ours.mean(), theirs.mean()))
-    if few(ours):
-        return middle, [[0.0], [0.0]]
-    low, high, _ = criteria.ratio_interval(ours, theirs)
-    return middle, [[max(middle - low, 0)], [max(high - middle, 0)]]
+def interval(ours: Array, theirs: Array) -> tuple[float, tuple[float, float]]:
+    """The ratio of the means and its 95% interval, no longer than a point for too few replicas; 1 for 0 / 0."""
+    if not few(ours):
+        low, high, _ = criteria.ratio_interval(ours, theirs)
+        return float(ours.mean() / theirs.mean()), (low, high)
+    middle = float(ratio(ours.mean(), theirs.mean())) or 1.0
+    return middle, (middle, middle)
 
 
 def pairs(a: Arrays, camera: str, scene: str) -> list[Pair]:
@@ -379,7 +388,7 @@ FIGURE = Figure(
             "replicas": 2,
             "blocks": 1,
             "crop": [4, 4],
-            "film": [16, 9],
+            "film": [12, 7],
             "still": 2,
             "moving": 2,
         },
