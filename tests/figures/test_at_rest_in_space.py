@@ -94,6 +94,12 @@ def test_what_a_moving_camera_looks_at_moves_by_half_a_pixel_along_either_axis_i
     assert np.allclose(abs(np.diff(places, axis=0)), 0.25, atol=1e-9)
 
 
+def test_it_goes_round_and_is_nowhere_twice_before_it_is_back():
+    sensors = rest.around(setting("CB3"), SIZE, 5)
+    assert len(set(sensors)) == 4
+    assert sensors[0] == sensors[-1]
+
+
 def sees_backs(s, sensor):
     """Whether some pixel sees the back of a surface, as through a wall."""
     return bool((facing(s.scene, sensor) < 0).any())
@@ -204,6 +210,14 @@ def test_two_of_three_scenes_are_enough_and_one_is_not(met, passed):
     assert judged(lambda camera, scene: SMALL if scene in NAMES[:met] else LARGE) == [passed] * 3
 
 
+@pytest.mark.parametrize("other", rest.OTHERS)
+def test_one_of_the_others_that_is_as_good_is_enough_to_miss_it(other):
+    a = arrays(64, lambda camera, scene: SMALL)
+    good = {key: SMALL * each for key, each in a.items() if f".{other}.d" in key}
+    claims = [rest.at_rest(a | good, camera, camera, "") for camera in rest.RESTING] + [rest.in_motion(a | good)]
+    assert [claim.outcome.passed for claim in claims if claim.outcome] in ([False, False], [False, False, False])
+
+
 def test_what_rays_cost_counts_at_rest_and_not_in_motion():
     a = arrays(64, lambda camera, scene: SMALL)
     dear = {key: np.array(8.0) for key in a if key.endswith("with.rays")}
@@ -217,7 +231,7 @@ def test_too_few_replicas_judge_nothing_and_have_the_same_parts():
     assert [claim.part for claim in many] == [claim.part for claim in few]
     assert len({claim.part for claim in many}) == len(many)
     assert [claim.outcome.passed for claim in many[:3]] == [True, True, True]
-    assert all(claim.outcome is None or claim.outcome.passed is None for claim in few)
+    assert all((claim.outcome is None) is not claim.part.endswith("how many") for claim in few)
 
 
 # ---------------------------------------------------------------- edges
