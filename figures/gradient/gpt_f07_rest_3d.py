@@ -325,8 +325,8 @@ def mark(axis: "Axes", a: Arrays, scene: str) -> None:
         axis.plot(*place, marker="o", markevery=1, ms=9, mfc="none", mec=colour, mew=width)
 
 
-TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
-"""Ratios that an axis may name."""
+TICKS, DECADES, WIDE = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20), (0.001, 0.01, 0.1, 1, 10, 100, 1000), 40.0
+"""Ratios that an axis names, those of one whose ends are further apart than by a factor, and the factor."""
 
 
 def bars(axis: "Axes", a: Arrays, scene: str) -> None:
@@ -344,7 +344,8 @@ def bars(axis: "Axes", a: Arrays, scene: str) -> None:
     low, high = min(ends) / 1.3, max(ends) * 1.3
     axis.set(xscale="log", xlim=(low, high), ylim=(len(ROWS) - 0.4, -0.6), title=f"{scene}, dx and dy")
     axis.minorticks_off()
-    axis.set_xticks(named := [each for each in TICKS if low < each < high], [f"{each:g}" for each in named])
+    named = [each for each in (DECADES if high > WIDE * low else TICKS) if low < each < high]
+    axis.set_xticks(named, [f"{each:g}" for each in named])
     axis.set(xlabel="variance of pair reuse, over others'")
     axis.grid(axis="y", visible=False)
 
