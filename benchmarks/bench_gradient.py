@@ -122,7 +122,7 @@ def runs_of(on: Scene, stage: Stage) -> dict[str, Callable[[], object]]:
 def initial(on: Scene) -> Iterator[Row]:
     """Rays of dx + dy alone, before anything is reused."""
     count = counts(on, started)
-    yield Row("initial candidates: rays per pixel of the primal", count["primal"])
+    yield Row("initial candidates: rays per pixel of the primal", count["primal"], claims="GPT-C09")
     alone = {name: count[name] - count["primal"] for name in WAYS}
     yield from (Row(f"initial candidates: rays per pixel of dx + dy, {name}", each) for name, each in alone.items())
     shared, *apart = alone.values()
@@ -135,7 +135,8 @@ def compared(what: str, on: Scene) -> Iterator[Row]:
     yield Row(f"{what}: rays per pixel of the primal", count["primal"])
     for unit, cost in {"rays": count, "CPU time": seconds}.items():
         for name in WAYS:
-            yield Row(f"{what}: primal + dx + dy over primal in {unit}, {name}", cost[name] / cost["primal"])
+            dearer = cost[name] / cost["primal"]
+            yield Row(f"{what}: primal + dx + dy over primal in {unit}, {name}", dearer, claims="GPT-C09")
 
 
 def costs(make: Callable[[Spatial, Counter[str]], View]) -> Iterator[Row]:

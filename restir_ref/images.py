@@ -10,7 +10,7 @@ import numpy as np
 
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
-from restir_ref.integrals import Image, Pixels
+from restir_ref.integrals import NOWHERE, Image, Pixels
 from restir_ref.loop import GOLDEN, Around
 
 Shape = tuple[int, int]
@@ -25,7 +25,7 @@ TRIES = 8
 def random_in_disk(shape: Shape) -> Around:
     """Neighbours uniform in the disk of a radius around each pixel of rows x columns, mirrored at the borders.
 
-    Near a border a mirrored one can be the pixel itself, which is unbiased, only no news.
+    Near a border a mirrored one can be the pixel itself: unbiased, but its own sample then counts twice.
     The choice raises ValueError for a radius below 1, and for images that are not whole crops of that shape.
 
     >>> import numpy as np
@@ -64,9 +64,10 @@ def spread_in_disk(shape: Shape) -> Around:
 
 
 def alike_among(alike: Alike, around: Around, tries: int = TRIES) -> Around:
-    """Neighbours of another choice that see alike: the first of so many tries, else the pixel itself.
+    """Neighbours of another choice that see alike: the first of so many tries that does, else `NOWHERE`.
 
-    A choice by G-buffers, never by samples; memory does not grow with the square of the image.  [Bitterli 2020]
+    Never the pixel itself, which would be merged with its own sample and count it twice.  A choice by G-buffers, never
+    by samples; memory does not grow with the square of the image.  [Bitterli 2020; GPT 4.3.2]
     """
 
     def among(of: Image, index: Array, count: int, radius: float, chance: Chance) -> list[Pixels]:
@@ -121,11 +122,11 @@ def _rings(steps: Array, count: int) -> list[Array]:
 
 
 def _first_alike(alike: Alike, of: Image, index: Array, tried: Sequence[Pixels]) -> Pixels:
-    """The first of the neighbours tried that sees alike, else the pixel itself."""
-    found, left = index.copy(), np.arange(len(index))
+    """The first of the neighbours tried that is another one and sees alike, else `NOWHERE`."""
+    found, left = np.full_like(index, NOWHERE), np.arange(len(index))
     for near in tried:
-        there = near.index.take(left)
-        like = alike(index.take(left) % of.n, there % of.n)
+        here, there = index.take(left), near.index.take(left)
+        like = (there != here) & alike(here % of.n, there % of.n)
         found[left[like]] = there[like]
         left = left[~like]
         if not len(left):

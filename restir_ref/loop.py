@@ -8,7 +8,7 @@ import numpy as np
 from restir_ref.batch import Array
 from restir_ref.chance import Chance
 from restir_ref.guards import named
-from restir_ref.integrals import Image, Pixels, Reservoirs
+from restir_ref.integrals import NOWHERE, Image, Pixels, Reservoirs
 from restir_ref.mis import WEIGHTS
 from restir_ref.restir import initial, spatial, temporal
 
@@ -139,7 +139,7 @@ def spread_in_row(of: Image, index: Array, count: int, radius: float, chance: Ch
 
 
 def alike_in_row(alike: Array) -> Around:
-    """Random neighbours within the radius among those that see alike, alike (n, n) bool; else the pixel itself.
+    """Random neighbours within the radius among those that see alike, alike (n, n) bool; else `NOWHERE`.
 
     A choice by G-buffers, never by samples.  [Bitterli 2020]
     """
@@ -150,8 +150,8 @@ def alike_in_row(alike: Array) -> Around:
         choices, listed = allowed.sum(axis=1), np.argsort(~allowed, axis=1, kind="stable")
         pixel = index % of.n
         chosen = (chance.uniform((count, len(index))) * choices[pixel]).astype(int)
-        near = np.where(choices[pixel] > 0, listed[pixel, chosen], pixel)
-        return [Pixels(of, index - pixel + each) for each in near]
+        near = np.where(choices[pixel] > 0, index - pixel + listed[pixel, chosen], NOWHERE)
+        return [Pixels(of, each) for each in near]
 
     return around
 

@@ -37,7 +37,7 @@ TRUTH, EPS = "truth", MappingProxyType({"dx": 0.01, "dy": 0.025})
 """What the truth's chunks are called, and the largest standard errors, for dy what its cost allows."""
 
 CHUNKS: Mapping[str, int] = MappingProxyType(
-    {TRUTH: 48, "with": 72, IN_PLACE: 40, GATHERED: 36, "after": 72, "path tracing": 48}
+    {TRUTH: 112, "with": 160, IN_PLACE: 90, GATHERED: 90, "after": 180, "path tracing": 108}
 )
 CLAIMS: Mapping[str, str] = MappingProxyType(
     {

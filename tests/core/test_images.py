@@ -9,7 +9,7 @@ import pytest
 from restir_ref import images
 from restir_ref.batch import Array
 from restir_ref.images import alike_among, disk, random_in_disk, spread_in_disk, tiles
-from restir_ref.integrals import Pixels
+from restir_ref.integrals import NOWHERE, Pixels
 from restir_ref.loop import GOLDEN, Around, random_in_row
 from tests.core.stubs import live
 
@@ -182,11 +182,21 @@ def stripes(width: int):
 
 
 @pytest.mark.parametrize(("around", "shape"), [(random_in_disk(SHAPE), SHAPE), (spread_in_disk(SHAPE), SHAPE)])
-def test_neighbours_that_see_alike_are_alike_or_the_pixel_itself(around, shape):
+def test_neighbours_that_see_alike_are_others_that_do_or_nobody(around, shape):
     pixel = np.arange(shape[0] * shape[1])
     found = near(alike_among(stripes(60), around), shape, 3, 6, pixel)
-    assert stripes(60)(pixel, found).all()
-    assert (found == pixel).mean() < 0.01 + 0.5**8
+    nobody = found == NOWHERE
+    assert (nobody | stripes(60)(pixel, found)).all()
+    assert nobody.mean() < 0.01 + 0.5**8
+    assert (found != pixel).all()
+
+
+def test_one_that_is_the_pixel_itself_is_passed_over():
+    """Of steps 0 and 1 the second is taken, of 0 alone none."""
+    everybody = alike_among(lambda i, j: i >= 0, listed(0, 1, 0, 0), 2)
+    first, second = everybody(Image(9), np.array([3, 5]), 2, 9, live())  # type: ignore[arg-type]
+    assert first.index.tolist() == [4, 6]
+    assert second.index.tolist() == [NOWHERE, NOWHERE]
 
 
 def listed(*steps_):
@@ -205,20 +215,20 @@ def test_it_is_the_first_of_those_tried_that_is_taken_and_replicas_look_at_the_s
 def test_eight_are_tried_for_each():
     """Three of four steps lead to the left, or back to the pixel itself."""
     found = near(alike_among(lambda i, j: i < j, random_in_disk((1, 3))), (1, 3), 2, 1, np.ones(200_000, dtype=int))
-    assert (found == 1).mean(axis=1) == pytest.approx(0.75**8, rel=0.05)
+    assert (found == NOWHERE).mean(axis=1) == pytest.approx(0.75**8, rel=0.05)
 
 
 def test_in_a_row_they_are_drawn_by_the_same_function():
     pixel = np.full(40_000, 50)
     found = near(alike_among(lambda i, j: j % 3 == 0, random_in_row, 16), (1, 101), 1, 10, pixel)[0]
-    counts = np.bincount(found, minlength=101)
-    assert set(np.flatnonzero(counts)) <= {*range(42, 61, 3), 50}
+    counts = np.bincount(found[found != NOWHERE], minlength=101)
+    assert set(np.flatnonzero(counts)) <= {*range(42, 61, 3)}
     assert np.abs(counts[42:61:3] / counts[42:61:3].mean() - 1).max() < 0.06
 
 
-def test_neighbours_of_a_pixel_unlike_all_others_are_itself():
+def test_a_pixel_unlike_all_others_has_no_neighbours():
     found = near(alike_among(lambda i, j: i == j, random_in_disk(SHAPE)), SHAPE, 3, 6, np.arange(2400))
-    assert (found == np.arange(2400)).all()
+    assert (found == NOWHERE).all()
 
 
 def test_random_neighbours_do_not_see_alike():
