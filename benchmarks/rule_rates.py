@@ -117,21 +117,23 @@ def null(count: int) -> None:
 
 
 def size(count: int) -> None:
-    """With a bias of one pair, loud or quiet, and with one of all pairs away from edges that changes its sign."""
+    """With a bias of some standard errors, of one pair, loud or quiet, or of a stretch of them that changes its sign."""
     images, n = population(), 5120
-    _, away, light = kinds(SCENE)
-    error, far = images.std(axis=0) / np.sqrt(n), np.flatnonzero(away)
-    noise = (error / light)[far]
-    one = {name: far[np.argsort(noise)[int(q * (len(far) - 1))]] for name, q in {"loud": 0.9, "quiet": 0.1}.items()}
+    stretches = kinds(SCENE)[1]
+    error, far = images.std(axis=0) / np.sqrt(n), np.concatenate(stretches)
+    order = far[np.argsort(error[far])]
+    one = {name: order[int(q * (len(far) - 1))] for name, q in {"loud": 0.9, "quiet": 0.1}.items()}
     pairs = np.arange(images.shape[1])
+    sign = (-1.0) ** pairs
+    biases = {f"a {kind} pair, {c}": c * (pairs == pair) for c in (4, 8, 16) for kind, pair in one.items()}
+    biases |= {
+        f"pairs {some[0]} to {some[-1]}, {c}, + and -": c * sign * np.isin(pairs, some)
+        for c in (0.75, 1, 1.5)
+        for some in stretches
+    }
     print(HEAD)
-    for times in (2, 4, 8, 16):
-        for name, pair in one.items():
-            text = f"a {name} pair, {times} of its errors"
-            print(line(text, rates(images, n, count, times * error * (pairs == pair)), count), flush=True)
-    for times in (0.5, 0.75, 1, 1.5):
-        text = f"all, + and -, {times} of their errors"
-        print(line(text, rates(images, n, count, times * error * away * (-1.0) ** pairs), count), flush=True)
+    for name, bias in biases.items():
+        print(line(name, rates(images, n, count, bias * error), count), flush=True)
 
 
 # ---------------------------------------------------------------- mistakes in the code
