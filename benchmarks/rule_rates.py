@@ -117,7 +117,7 @@ def null(count: int) -> None:
 
 
 def size(count: int) -> None:
-    """With a bias of some standard errors, of one pair, loud or quiet, or of a stretch of them that changes its sign."""
+    """With a bias of some standard errors, of one pair, loud or quiet, or of a stretch, changing its sign."""
     images, n = population(), 5120
     stretches = kinds(SCENE)[1]
     error, far = images.std(axis=0) / np.sqrt(n), np.concatenate(stretches)
