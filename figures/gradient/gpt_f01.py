@@ -32,7 +32,7 @@ from figures.experiments.gradients import (
 from figures.experiments.references import reference
 from figures.experiments.replicas import few, told
 from figures.experiments.views import setting, standard
-from figures.gradient.gpt_f07 import whole_view
+from figures.gradient.gpt_f07 import unlit, whole_view
 from figures.report import style
 from flatland2d.pictures import scene_picture
 from restir_ref.batch import Array
@@ -190,6 +190,8 @@ def check(a: Arrays) -> list[Claim]:
         part, image = f"{view}, L2, with / path tracing", alone(a, view)["total"]
         claims.append(by_metrics.smaller("GPT-F01", by_metrics.pairs(ours, traced), 1, part, STILL))
         claims.append(by_metrics.told("GPT-F01", by_metrics.pairs(ours, image), f"{view}, L2 with / image alone"))
+        black = (a[f"{view}.path tracing.primal"] == 0).all(axis=0).reshape(SIDE, SIDE)
+        claims.append(unlit("GPT-F01", l2(*inputs(a, view, "with")), black, f"{view}, pixels that no light reaches"))
     claims += norms(a)
     near, elsewhere = flicker(a)
     part = "power of the change between frames, near edges / elsewhere"
@@ -223,7 +225,7 @@ def draw(a: Arrays) -> "Picture":
     for axis, view in zip(axes[0], MAPS, strict=False):
         whole_view(axis, view.removesuffix(" map"))
     scene_picture(axes[0, 2], setting("checker"), standard("checker").n)
-    axes[0, 2].set(title="checker row: its inset")
+    axes[0, 2].set(title="checker row: what its inset sees")
     noise_of_maps(axes[1, 0], a)
     changes_of_row(axes[1, 1], a)
     errors = {name: high_error(a, name).mean() for name in images(a)}
