@@ -209,9 +209,10 @@ STILL = "Maps stand still; the caption's camera moves."
 
 def norms(a: Arrays) -> list[Claim]:
     """L1 against L2, bias and all, on all maps by all methods: in at least half of the cases that are decided."""
-    cases = {f"{view}, {method}": l1_over_l2(a, view, method) for view in MAPS for method in METHODS}
-    reported = [by_metrics.told("GPT-C03", compared, f"L1 / L2, {case}") for case, compared in cases.items()]
-    return [by_metrics.often("GPT-C03", cases, "L1 / L2, all maps and methods"), *reported]
+    cases = {(view, method): l1_over_l2(a, view, method) for view in MAPS for method in METHODS}
+    reported = [by_metrics.told("GPT-C03", cases[case], f"L1 / L2, {', '.join(case)}") for case in cases]
+    named = {f"{view.removesuffix(' map')} {method}": each for (view, method), each in cases.items()}
+    return [by_metrics.often("GPT-C03", named, "L1 / L2, all maps and methods"), *reported]
 
 
 def l1_over_l2(a: Arrays, view: str, method: str) -> by_metrics.Pairs:
@@ -245,7 +246,7 @@ def noise_of_maps(axis: "Axes", a: Arrays) -> None:
             look = style.bar(method, label=method if k == 0 else "_")
             axis.bar(k + 0.2 * (j - 1.5), each["total"][MSE].mean(), 0.18, **look)
     axis.set_xticks([0, 1], MAPS)
-    axis.set(yscale="log", ylabel="variance ((radiance x radian)$^2$)", title="L2 images of maps, equal rays")
+    axis.set(yscale="log", ylabel="variance (fluence$^2$)", title="L2 images of maps, equal rays")
     axis.grid(axis="x", visible=False)
     style.below(axis, ncols=2)
 

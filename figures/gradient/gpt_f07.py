@@ -188,7 +188,7 @@ def draw(a: Arrays) -> "Picture":
             picture.colorbar(shown, ax=axis, label="$I_{i+1} - I_i$, fluence", shrink=0.8)
         for method in METHODS:
             row[4].bar(method, gradient_error(a, scene, method).mean(), **style.bar(method))
-        row[4].set(ylabel="variance ((radiance x radian)$^2$)", title=f"{scene}, equal rays")
+        row[4].set(ylabel="variance (fluence$^2$)", title=f"{scene}, equal rays")
         row[4].tick_params(axis="x", labelrotation=20)
         row[4].grid(axis="x", visible=False)
     return picture

@@ -10,7 +10,9 @@ Of the up to four previous pixels that a moved one overlaps, what lies in its sq
 rejected or moved into it: Area ReSTIR has both options, and the paper does not say which it took.  So either is an arm,
 and a claim holds that holds by one of them in two of three scenes.  What asking one pixel blindly does is reported.
 All are unbiased before reconstruction, and L2 keeps that, so that the variance over replicas is the squared error; L1
-and a filter have their bias added, from the mean of all L2 images.
+and a filter have their bias added, from the mean of all L2 images.  Images are compared by the squared error and by the
+same relative to the pixel of that mean, as the paper names neither, and against the best image without differences, by
+either option, with reuse in space or without.
 """
 
 from collections import Counter
