@@ -176,7 +176,7 @@ INSIDE = "What is inside of a post or a wall.  ReSTIR and paths leave it black, 
 
 def draw(a: Arrays) -> "Picture":
     """Where the crop lies, one replica's dx of every method, and their errors."""
-    picture, axes = style.panels(len(SCENES), 5, width=2.8, height=2.4)
+    picture, axes = style.panels(len(SCENES), 5, width=2.7, height=2.4)
     for row, scene in zip(axes, SCENES, strict=True):
         whole_view(row[0], scene)
         high = scale(a[f"{scene}.with.dx"])
