@@ -327,6 +327,54 @@ def test_a_claim_that_holds_by_other_options_by_either_metric_says_so(monkeypatc
     assert by_both_metrics(monkeypatch, {MSE: HOLDS, RELATIVE: HOLDS}).caveat == "Only where history is kept."
 
 
+def powers(sizes):
+    """A stand-in for `power`: by (method, image), in total 1 and above alpha what is given, twice that by relMSE."""
+    noise = 1 + 0.01 * np.random.default_rng(1).normal(size=(8, 64))
+
+    def power(a, view, method, image, cost=space.dearer):
+        size, wave = sizes[method, image], noise[[*space.METHODS].index(method) + 4 * (image == "L1")]
+        return {band: {MSE: k * size * wave, RELATIVE: 2 * k * size * wave} for band, k in (("total", 1), ("high", 3))}
+
+    return power
+
+
+def test_rebuilt_images_are_compared_in_total_with_gradients_and_above_alpha_with_the_best_image(monkeypatch):
+    sizes = {"with": 0.5, "after": 1.0, "path tracing": 2.0}
+    monkeypatch.setattr(space, "power", powers({(method, "L2"): size for method, size in sizes.items()}))
+    monkeypatch.setattr(space, "area", lambda a, view: {"high": {MSE: np.ones(64), RELATIVE: np.full(64, 8.0)}})
+    for metric, best in ((MSE, 1.5), (RELATIVE, 3 / 8)):
+        found = [each.ours.mean() / each.theirs.mean() for each in space.of_rebuilt("L2", metric)({}, VIEW)]
+        assert found == pytest.approx([0.5, 0.25, best], rel=0.01)
+        found = [each.ours.mean() / each.theirs.mean() for each in space.of_noise("L2", metric)({}, VIEW)]
+        assert found == pytest.approx([0.25, best], rel=0.01)
+
+
+@pytest.mark.parametrize(("lower", "passed"), [(0.5, True), (2.0, False)])
+def test_l1_over_l2_counts_all_scenes_and_methods(monkeypatch, lower, passed):
+    sizes = {(method, norm): lower if norm == "L1" else 1.0 for method in space.METHODS for norm in space.NORMS}
+    monkeypatch.setattr(space, "power", powers(sizes))
+    monkeypatch.setattr(space, "scenes_of", lambda a: SCENES)
+    outcome = space.lower({}).outcome
+    assert outcome.passed is passed
+    assert all(f"{scene} {method}" in outcome.measured for scene in SCENES for method in space.METHODS)
+
+
+@pytest.mark.parametrize(("ours", "passed"), [(0.2, True), (0.3, False)])
+def test_images_at_rest_are_judged_above_alpha_against_the_best_image_at_equal_rays(monkeypatch, ours, passed):
+    """3 x .2 of 1 is below .8, 3 x .3 is not; in total either is."""
+    best = {MSE: np.ones(64), RELATIVE: np.full(64, 2.0)}
+    monkeypatch.setattr(space, "power", powers({("with", norm): ours for norm in space.NORMS}))
+    monkeypatch.setattr(space, "scenes_of", lambda a: SCENES)
+    monkeypatch.setattr(space, "alone", lambda a, view: {"high": best, "total": best})
+    assert {space.rest_images({}, norm).outcome.passed for norm in space.NORMS} == {passed}
+
+
+def test_all_cameras_help_to_tell_a_bias_of_l2():
+    left, of = space.eighths(l2_images(0.0, 0.1), "CB3")
+    assert left.shape == (5 * 64, 8)
+    assert of == pytest.approx(1, abs=0.01)
+
+
 def l2_images(shift, noise):
     """Path tracing of 8 x 8 pixels by all cameras, whose L2 differs from its image by this, with so much noise."""
     rng, found = np.random.default_rng(1), {}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from figures.experiments import by_metrics
+from figures.experiments.gradients import averaged
 from figures.experiments.pans import floor_views
 from figures.gradient import gpt_f01, gpt_f05, gpt_f07, gpt_f10, gpt_f10_3d, gpt_f12
 from restir_ref.gradient_loop import PRIMAL
@@ -96,6 +97,29 @@ def test_the_better_image_alone_is_the_better_one_at_its_rays():
         assert gpt_f07.rays_of(a, "s", other) == pytest.approx(1)
 
 
+def test_on_maps_differences_and_images_above_alpha_are_judged_at_one_limit(monkeypatch):
+    swing, sizes = np.tile([-1.0, 1.0], 32), {"with": 0.75, "after": 1.0, "path tracing": 1.0, gpt_f07.ONE: 1.0}
+    waves = {method: 1 + 1e-3 * (k + 1) * swing for k, method in enumerate(sizes)}
+    monkeypatch.setattr(gpt_f07, "gradient_error", lambda a, scene, method: sizes[method] * waves[method])
+
+    def power(a, scene, method):
+        return {band: dict.fromkeys(by_metrics.METRICS, sizes[method] * waves[method]) for band in gpt_f07.BANDS}
+
+    monkeypatch.setattr(gpt_f07, "noise_of", power)
+    monkeypatch.setattr(gpt_f07, "primal", lambda a, scene: power(a, scene, "after"))
+    monkeypatch.setattr(gpt_f07, "rebuilt", lambda a, scene, method: np.zeros((2, 24, 24)))
+    a = {f"{scene}.path tracing.primal": np.ones((2, 576)) for scene in gpt_f07.SCENES}
+    for ours, passed in ((0.75, True), (0.85, False)):
+        sizes["with"] = ours
+        judged = {f"{c.id} {c.part}": c.outcome.passed for c in gpt_f07.check(a) if c.outcome}
+        found = {part for part, answer in judged.items() if answer is not None}
+        assert {judged[part] for part in found} == {passed}
+        assert len(found) == 3 * len(gpt_f07.SCENES)
+        assert {part for part in found if "GPT-F08" in part} == {
+            f"GPT-F08 {scene}, L2 with / primal, above alpha" for scene in gpt_f07.SCENES
+        }
+
+
 def test_pixels_that_no_light_reaches_are_told_with_their_share_of_either_error():
     black = np.arange(576).reshape(24, 24) < 144
     images = 1.0 * ~black + 0.1 * noise(64, 576).reshape(64, 24, 24)
@@ -122,17 +146,19 @@ def two_maps():
 
 
 def test_all_maps_and_methods_are_cases_of_l1_against_l2(monkeypatch):
-    asked = []
+    asked, lower = [], [0.5]
     swing = np.tile([-1.0, 1.0], 32)
 
     def error(a, view, method, norm="L2"):
         asked.append((view, method, norm))
-        return {"total": dict.fromkeys(by_metrics.METRICS, (0.5 if norm == "L1" else 1.0) + 1e-3 * swing)}
+        return {"total": dict.fromkeys(by_metrics.METRICS, (lower[0] if norm == "L1" else 1.0) + 1e-3 * swing)}
 
     monkeypatch.setattr(gpt_f01, "rebuilt_error", error)
     judged, *reported = gpt_f01.norms({})
     assert {(view, method) for view, method, _ in asked} == {(v, m) for v in gpt_f01.MAPS for m in gpt_f01.METHODS}
     assert judged.outcome.passed is True
+    lower[0] = 2.0
+    assert gpt_f01.norms({})[0].outcome.passed is False
     assert all(claim.outcome.passed is None for claim in reported)
     assert len(reported) == len(gpt_f01.MAPS) * len(gpt_f01.METHODS)
 
@@ -144,3 +170,12 @@ def test_on_maps_l1_has_its_bias_and_l2_none():
     none, its_own = (gpt_f01.error_of(a, view, "with", images, biased=b)["total"]["MSE"].mean() for b in (0.0, 1.0))
     assert none == pytest.approx(8 / 7)
     assert its_own == pytest.approx(8 / 7 + (gpt_f01.truth(a, view) ** 2).mean())
+
+
+def test_the_better_image_of_a_map_is_the_better_one_by_either_metric():
+    a = two_maps()
+    view, dear = gpt_f01.MAPS[0], 100 / gpt_f01.SHARES["after"]
+    alone = gpt_f01.alone(a | {f"{view}.after.rays": np.array(dear)}, view)["total"]
+    cheap = averaged(a[f"{view}.temporal.primal"], gpt_f01.SHARES["temporal"]).reshape(-1, 24, 24)
+    expected = gpt_f01.error_of(a, view, "temporal", cheap)["total"]
+    assert all(alone[metric] == pytest.approx(expected[metric]) for metric in by_metrics.METRICS)
