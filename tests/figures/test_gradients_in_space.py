@@ -349,6 +349,15 @@ def test_rebuilt_images_are_compared_in_total_with_gradients_and_above_alpha_wit
         assert found == pytest.approx([0.25, best], rel=0.01)
 
 
+def test_images_are_judged_by_every_metric_and_differences_by_their_variance_alone():
+    assert space.by_both(lambda norm, metric: (norm, metric), "L1") == {metric: ("L1", metric) for metric in METRICS}
+    assert {each.id: tuple(each.by) for each in space.JUDGED} == {
+        "GPT-F07": ("",),
+        "GPT-F08": METRICS,
+        "GPT-F01": METRICS,
+    }
+
+
 @pytest.mark.parametrize(("lower", "passed"), [(0.5, True), (2.0, False)])
 def test_l1_over_l2_counts_all_scenes_and_methods(monkeypatch, lower, passed):
     sizes = {(method, norm): lower if norm == "L1" else 1.0 for method in space.METHODS for norm in space.NORMS}

@@ -122,12 +122,12 @@ def test_on_maps_differences_and_images_above_alpha_are_judged_at_one_limit(monk
 
 def test_pixels_that_no_light_reaches_are_told_with_their_share_of_either_error():
     black = np.arange(576).reshape(24, 24) < 144
-    images = 1.0 * ~black + 0.1 * noise(64, 576).reshape(64, 24, 24)
+    images = 1.0 * ~black + noise(64, 576).reshape(64, 24, 24)
     said = gpt_f07.unlit("GPT-F08", images, black, "part").outcome.measured
     assert said.startswith("25.0% of all")
     squared, relative = (float(each.split()[1].rstrip("%")) for each in said.split("L2's ")[1].split(", "))
-    assert squared == pytest.approx(25, abs=1)
-    assert relative > 99
+    assert squared == pytest.approx(25, abs=2)
+    assert relative > 99.9  # the reference is 0 there, not the noise of its mean
 
 
 # ---------------------------------------------------------------- L1 and L2, on maps
