@@ -70,13 +70,13 @@ def compute(preset: Any, chunk: Any, *, rng: np.random.Generator) -> Arrays:
         own, replicas = preset_of(spatial, WINDOW_OF_A_MAP), preset["map"]["replicas"]
         views = views_of(scene, own, spatial, asked)[:1] * preset["map"]["frames"]
     else:
-        own, replicas = preset_of(spatial, WINDOW), preset["replicas"]
+        own, replicas = preset_of(spatial), preset["replicas"]
         views = views_along(scene, panned(scene, FILM, STEP, FRAMES), own, spatial, asked)
     found = with_restir(views, asked, replicas, chance, own)
     return {name: each for name, each in found.items() if name != PRIMAL}
 
 
-def preset_of(spatial: Spatial, window: float) -> GradientPreset:
+def preset_of(spatial: Spatial, window: float = WINDOW) -> GradientPreset:
     """Alike pairs are sought in a window, all others within the radius."""
     far = window if spatial.whom == "aligned" else RADIUS
     pixels, pairs = replace(GRADIENT.pixels, radius=RADIUS), replace(GRADIENT.pairs, radius=far)
@@ -97,7 +97,7 @@ def combine(preset: Any, results: Sequence[Arrays]) -> Arrays:
 
 def masks() -> Arrays:
     """Which pairs of the last frame are edges, by "edge.scene.direction"."""
-    own, asked = preset_of(ADAPTIVE, WINDOW), Counter[str]()
+    own, asked = preset_of(ADAPTIVE), Counter[str]()
     last = {scene: views_along(scene, panned(scene, FILM, STEP, 1), own, ADAPTIVE, asked)[-1] for scene in SCENES}
     last[MAP] = views_of(MAP, own, ADAPTIVE, asked)[-1]
     return {
@@ -268,7 +268,7 @@ FIGURE = Figure(
     arm="reuse",
     presets={
         "quick": {"replicas": 2, "map": {"replicas": 2, "blocks": 1, "frames": 3}},
-        "paper": {"replicas": 128, "map": {"replicas": 32, "blocks": 3, "frames": 3 * GRADIENT.pairs.cap}},
+        "paper": {"replicas": 128, "map": {"replicas": 32, "blocks": 4, "frames": 3 * GRADIENT.pairs.cap}},
     },
     chunks=chunks,
     compute=compute,
