@@ -1,7 +1,10 @@
 """Noise of a reconstructed row, frequency by frequency: what GPT-P03 expects of noise that is not white."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from figures.claims.figure import Claim
 from restir_ref.batch import Array
 from restir_ref.poisson import ALPHA, cosine_power, symbol, transposed
 
@@ -30,7 +33,18 @@ CLOSE = 0.9, 1.1
 """Measured power over the expected one: to 10%, said before it was measured."""
 
 
-def left_out(measured: Array, by_formula: Array) -> str:
-    """How large the cross terms are, over what is expected without them, in words."""
-    share = float(measured.mean() / by_formula.mean()) - 1
-    return f"Cross terms of image and differences, which GPT-P03 leaves out, are {share:+.0%} of what it expects."
+def explained(claim: Claim, powers: tuple[Array, Array]) -> Claim:
+    """The claim with how large the cross terms are, over what is expected without them: of measured and expected power.
+
+    Where it is judged, a pass has a caveat.
+    """
+    share = float(powers[0].mean() / powers[1].mean()) - 1
+    why = f"Cross terms of image and differences, which GPT-P03 leaves out, are {share:+.0%} of what it expects."
+    judged = claim.outcome is not None and claim.outcome.passed is not None
+    return replace(claim, reason=f"{claim.reason}  {why}".lstrip(), caveat=LINEAR if judged else claim.caveat)
+
+
+LINEAR = (
+    "L2 is linear, so that only cross terms can break this; whether the power left is little, and where, is said "
+    "beside it."
+)

@@ -19,7 +19,7 @@ from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments.gradients import NONE, gradient_view, path_traced
 from figures.experiments.references import reference
 from figures.experiments.replicas import inside, placed
-from figures.experiments.spectra import CLOSE, expected, left_out
+from figures.experiments.spectra import CLOSE, expected, explained
 from figures.experiments.views import setting, standard
 from figures.report import style
 from restir_ref.batch import Array
@@ -111,7 +111,6 @@ def by_octave(a: Arrays) -> list[Claim]:
     order = float(spearmanr(np.arange(len(before)), after / before).statistic)
     number, both = farthest(beside_the_formula(a))
     parts = "order of noise ratios by octave", "power after / by GPT-P03, the octave farthest off"
-    off = f"Octave {number} of {len(before)}.  {left_out(*both)}"
     by = f"s_g / s_c = {s_g:.3f}: judged by {parts[0 if s_g < CLEAN else 1]}."
     first = criteria.below(order, -0.8) if s_g < CLEAN else criteria.reported(order)
     second = placed(id_, criteria.ratio_interval(*both), inside(*CLOSE), parts[1])
@@ -119,7 +118,7 @@ def by_octave(a: Arrays) -> list[Claim]:
         second = Claim(id_, criteria.reported(criteria.ratio_interval(*both)[2]), parts[1])
     return [
         Claim(id_, first, parts[0], reason=by),
-        replace(second, reason=f"{second.reason}  {off}".lstrip()),
+        explained(replace(second, reason=f"Octave {number} of {len(before)}.  {second.reason}".rstrip()), both),
     ]
 
 

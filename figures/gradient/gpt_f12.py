@@ -7,7 +7,6 @@ bias.  Differences are unbiased, so that variances over replicas are squared err
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments.gradients import METHODS, SIDE, averaged, rendered, spread, temporal_only
 from figures.experiments.references import reference
 from figures.experiments.replicas import Interval, Window, compared, few, inside, placed, smaller, told, under
-from figures.experiments.spectra import CLOSE, expected, in_bands, left_out
+from figures.experiments.spectra import CLOSE, expected, explained, in_bands
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.metrics import ROW, band_powers
@@ -172,7 +171,7 @@ def repaired(a: Arrays) -> list[Claim]:
         parts = f"power after / before, {band} alpha", f"power after / by GPT-P03, {band} alpha"
         first = compared(id_, own, window, parts[0]) if s_g < LITTLE else told(id_, own, parts[0])
         second = told(id_, formula, parts[1]) if s_g < LITTLE else compared(id_, formula, inside(*CLOSE), parts[1])
-        claims += [first, replace(second, reason=f"{second.reason}  {left_out(*formula)}".lstrip())]
+        claims += [first, explained(second, formula)]
     return claims
 
 
