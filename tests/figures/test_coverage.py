@@ -7,7 +7,6 @@ do.  Measured, 150 pairs each: of the first 94 to 97%, of the second 89 to 93%, 
 from collections.abc import Callable
 
 import numpy as np
-import pytest
 
 from figures.claims.criteria import ratio_interval
 
@@ -28,9 +27,8 @@ def coverage(sigma: float, replicas: int, interval: Interval = usual) -> float:
     return float(np.mean([low <= 1 <= high for low, high in ends]))
 
 
-@pytest.mark.parametrize("replicas", REPLICAS)
-def test_of_light_tails_it_holds_the_truth_about_as_often_as_it_says(replicas):
-    assert coverage(LIGHT, replicas) > 0.92
+def test_of_light_tails_it_holds_the_truth_about_as_often_as_it_says():
+    assert coverage(LIGHT, 64) > 0.92
 
 
 def test_of_heavy_tails_it_does_not_and_more_replicas_hardly_mend_that():
