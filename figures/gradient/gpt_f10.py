@@ -268,7 +268,7 @@ FIGURE = Figure(
     arm="reuse",
     presets={
         "quick": {"replicas": 2, "map": {"replicas": 2, "blocks": 1, "frames": 3}},
-        "paper": {"replicas": 128, "map": {"replicas": 32, "blocks": 4, "frames": 3 * GRADIENT.pairs.cap}},
+        "paper": {"replicas": 128, "map": {"replicas": 32, "blocks": 3, "frames": 3 * GRADIENT.pairs.cap}},
     },
     chunks=chunks,
     compute=compute,
