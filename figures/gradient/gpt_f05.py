@@ -138,12 +138,42 @@ def check(a: Arrays) -> list[Claim]:
     gradient, primal = ({arm: error(a, arm, name) for arm in ARMS} for name in WHAT)
     claims = []
     for point in POINTS:
-        claims += [
+        both = [
             smaller("GPT-F05", (gradient[AREA], gradient[point]), 0.8, f"gradient, area / {point}"),
             gain(primal, gradient, point),
         ]
+        claims += [of_another_integral(each) for each in both] if point == MIDDLE else both
     kept = gradient[AREA], gradient[KEPT]
-    return [*claims, replace(told("GPT-F05", kept, f"gradient, area / {KEPT}"), reason=few(kept[0]) or NOT_POINT)]
+    return [
+        *claims,
+        replace(told("GPT-F05", kept, f"gradient, area / {KEPT}"), reason=few(kept[0]) or NOT_POINT),
+        with_what_they_miss(a),
+    ]
+
+
+def of_another_integral(claim: Claim) -> Claim:
+    """What a miss says is no opposite: arms that estimate different integrals refute nothing."""
+    return replace(claim, counter=None, reason=f"{claim.reason}  {MIDDLES}".lstrip())
+
+
+MIDDLES = "What is seen through the middles of pixels has none of the noise of their edges, which it does not see."
+
+
+def with_what_they_miss(a: Arrays) -> Claim:
+    """Squared errors against the integrals over pixels, so with what middles miss of them: area / middle, reported."""
+    part = f"area / {MIDDLE}, squared errors against whole pixels, gradient and primal"
+    if few(a[f"{AREA}.dx"]):
+        return Claim("GPT-F05", None, part, reason=few(a[f"{AREA}.dx"]))
+    text = " and ".join(f"{of_whole_pixels(a, name):.3g}" for name in WHAT)
+    return Claim("GPT-F05", criteria.reported(text), part)
+
+
+def of_whole_pixels(a: Arrays, name: str) -> float:
+    """Var / (var + bias^2), the bias being the difference of both arms' means, less its own noise."""
+    area, middle = a[f"{AREA}.{name}"], a[f"{MIDDLE}.{name}"]
+    noise = [each.var(axis=0, ddof=1).mean() for each in (area, middle)]
+    bias2 = ((area.mean(axis=0) - middle.mean(axis=0)) ** 2).mean() - sum(noise) / len(area)
+    return float(noise[0] / (noise[1] + bias2))
 
 
 NOT_POINT = (

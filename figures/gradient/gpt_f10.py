@@ -7,7 +7,8 @@ edges of the same kind.  All are unbiased, so that the variance of differences o
 Edges of a row are single points; those of the map are lines, so that edge pairs have neighbours on their own edge.
 Radii are those of a film of 1920 pixels, 20 of which are 5 here, in rows of 480 pixels and in the map, whose whole room
 would have as many.  The paper leaves the window of the search for alike pairs open: 64 pixels in rows; in the map 24, a
-twentieth of the film as in space, which is all of the crop.  The map is judged after three times the cap of confidence.
+twentieth of the film as in space, which is all of the crop.  The map is judged after as many frames as the cap of
+confidence; three times as many, as where a chain's start must be forgotten, take three times as long.
 """
 
 from collections import Counter
@@ -268,7 +269,7 @@ FIGURE = Figure(
     arm="reuse",
     presets={
         "quick": {"replicas": 2, "map": {"replicas": 2, "blocks": 1, "frames": 3}},
-        "paper": {"replicas": 128, "map": {"replicas": 32, "blocks": 3, "frames": 3 * GRADIENT.pairs.cap}},
+        "paper": {"replicas": 128, "map": {"replicas": 32, "blocks": 2, "frames": GRADIENT.pairs.cap}},
     },
     chunks=chunks,
     compute=compute,
