@@ -8,7 +8,7 @@ Edges of a row are single points; those of the map are lines, so that edge pairs
 Radii are those of a film of 1920 pixels, 20 of which are 5 here, in rows of 480 pixels and in the map, whose whole room
 would have as many.  The paper leaves the window of the search for alike pairs open: 64 pixels in rows; in the map 24, a
 twentieth of the film as in space, which is all of the crop.  The map is judged after as many frames as the cap of
-confidence; three times as many, as where a chain's start must be forgotten, take three times as long.
+confidence, not after three times as many, which would forget its start: for time.
 """
 
 from collections import Counter
