@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from figures.claims.figure import verdict_of
-from figures.experiments.gradients import NONE, views_of
-from figures.experiments.pans import floor_views, panned, views_along
+from figures.experiments.gradients import CROP, NONE, SIDE, views_of
+from figures.experiments.pans import SMALL, floor_views, panned, views_along
 from figures.gradient import gpt_f05, gpt_f07, gpt_f10, gpt_f10_3d, gpt_f12
 from restir_ref.batch import changed
 from restir_ref.chance import Live
@@ -50,6 +50,13 @@ def test_on_the_map_edge_pairs_stand_side_by_side_and_the_window_finds_them():
     columns = np.flatnonzero(dx.active)
     (near,) = dx.around(dx.of["positive"], columns, 1, own.pairs.radius, Live(np.random.default_rng(1)))
     assert (near.index == NOWHERE).mean() < 0.05
+
+
+def test_radii_and_windows_are_shares_of_the_film_and_the_map_is_a_crop_of_480_pixels():
+    film = round(SIDE / CROP)
+    assert film == gpt_f10.FILM
+    assert film * 20 / 1920 == gpt_f10.RADIUS
+    assert gpt_f10.WINDOW_OF_A_MAP / film == gpt_f10_3d.WINDOW / SMALL[0] == 1 / 20
 
 
 def gradients(edge_gain=1.0, random_gain=1.0, interior_gain=1.0):
