@@ -19,7 +19,7 @@ from figures.claims import criteria
 from figures.claims.figure import Arrays, Claim, Conditions, Figure, Setup
 from figures.experiments.gradients import ADAPTIVE, DENSE, NONE, Spatial, grey, spread
 from figures.experiments.pans import floor_views
-from figures.experiments.replicas import few, smaller
+from figures.experiments.replicas import compared, few, inside, smaller
 from figures.report import style
 from restir_ref.batch import Array
 from restir_ref.chance import Live
@@ -113,11 +113,8 @@ def beside(id_: str, pair: tuple[Array, Array], part: str) -> Claim:
 
 def unchanged(a: Arrays, frame: int) -> Claim:
     """Interior pairs reuse in space in neither arm."""
-    ours, none = (error(a, arm, frame, INTERIOR) for arm in ("adaptive", "no neighbours"))
-    part = "aligned / no neighbours, interior pairs"
-    if few(ours):
-        return Claim("GPT-F06", None, part, reason=few(ours))
-    return Claim("GPT-F06", criteria.ratio_within(ours, none, 0.9, 1.1), part)
+    pair = error(a, "adaptive", frame, INTERIOR), error(a, "no neighbours", frame, INTERIOR)
+    return compared("GPT-F06", pair, inside(0.9, 1.1), "aligned / no neighbours, interior pairs")
 
 
 def saved(a: Arrays) -> float:
