@@ -1,5 +1,8 @@
 """Gradient-domain ReSTIR is unbiased: differences of a checker floor and of occluders, still and moving.
 
+What is rendered, and what is said of images and their means; differences are judged anew by `row_gradients`, for the
+z-spread that `judge` asks for here calls path tracing biased as well.
+
 The mean of dx over a row telescopes to nothing, so every difference is taken with the sign of the true one, over the
 mean of their sizes: then the truth of the row is 1.  Replicas are independent; only the last frame of each counts.
 Two mistakes stand beside: w = 1/2 also where a shift is undefined, and one pixel's samples without the other's.

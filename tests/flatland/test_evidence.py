@@ -26,6 +26,7 @@ from benchmarks.jobs import (
     report,
     retracing,
     roundtrips,
+    row_gradients,
     signing,
     space_gradients,
     space_means,
@@ -538,10 +539,11 @@ def test_differences_with_the_wrong_sign_or_size_turn_their_row_of_a_square_red_
 
 def test_rows_of_gradients_run_and_those_with_the_wrong_sign_and_mistakes_that_are_none_turn_red(monkeypatch) -> None:
     cases = {("checker", "path tracing", "frame 1"): (12, 0.02), ("occluders", "w = 1/2", "frame 1"): (8, 0.01)}
-    monkeypatch.setattr(gradients, "CASES", cases)
-    assert all(row.holds for row in rows(gradients.JOB, 1.0))
+    for module in (gradients, row_gradients):
+        monkeypatch.setattr(module, "CASES", cases)
+    assert all(row.holds for row in rows(row_gradients.JOB, 1.0))
     monkeypatch.setattr(gradients, "METHODS", {"path tracing": turned, "w = 1/2": gradients.path_traced})
-    assert not any(row.holds for row in rows(gradients.JOB, 1.0))
+    assert not any(row.holds for row in rows(row_gradients.JOB, 1.0))
 
 
 def turned(*of):

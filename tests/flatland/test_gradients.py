@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.jobs.gradients import METHODS, MISTAKES
 from figures.experiments import gradients
-from figures.experiments.flatland import displaced
+from figures.experiments.flatland import displaced, moving
 from figures.experiments.following import in_place
 from figures.experiments.gradients import ADAPTIVE, DENSE, MAPS, NONE, gradient_view, sensors_of, with_restir
 from figures.experiments.references import reference
@@ -20,9 +21,9 @@ from restir_ref.area import Displaced
 from restir_ref.batch import take
 from restir_ref.chance import Live
 from restir_ref.gradient import Pairs
-from restir_ref.gradient_loop import GRADIENT, PRIMAL, forward, step
+from restir_ref.gradient_loop import GRADIENT, PRIMAL, View, forward, step
 from restir_ref.images import alike_among
-from restir_ref.integrals import NOWHERE, Pixels, target
+from restir_ref.integrals import NOWHERE, Pixels, Shifted, target
 from restir_ref.loop import random_in_row
 from restir_ref.restir import initial
 from restir_ref.transport.edges import TRIES, Seen, edges, like_pairs, seen
@@ -238,6 +239,60 @@ def test_a_camera_that_pans_by_fractions_leaves_image_and_differences_unbiased(h
     probe = (dx * np.sign(np.diff(truth))).sum(axis=1) / abs(np.diff(truth)).sum() - 1
     assert abs(probe.mean()) < 4 * probe.std(ddof=1) / np.sqrt(12)
     assert probe.std(ddof=1) / np.sqrt(12) < 0.1
+
+
+POSTS = slice(24, 66)
+"""Pixels of the row of occluders that show both posts and what is beside them."""
+
+
+def behind_posts(frames: int) -> list[View]:
+    """Frames that pan by fractions of a pixel."""
+    sensors = [replace(each, first=each.first + 24, n=42) for each in moving("occluders", frames, 0.00035)]
+    moves = zip(sensors, [sensors[0], *sensors], strict=False)
+    return [gradient_view("occluders", each, Counter(), GRADIENT, ADAPTIVE) for each in moves]
+
+
+def relative_bias(method: gradients.Method, frames: int, images: int = 2400) -> tuple[float, float]:
+    """Of dx with the signs of the true one, over the mean of |dx|; and the standard error."""
+    true = np.diff(reference("occluders").mean[POSTS])
+    dx = method(behind_posts(frames), Counter(), images, Live(np.random.default_rng(5)))["dx"]
+    probe = (dx * np.sign(true)).sum(axis=1) / abs(true).sum() - 1
+    return float(probe.mean()), float(probe.std(ddof=1) / np.sqrt(images))
+
+
+@pytest.mark.claims("GPT-A12")
+def test_differences_by_path_tracing_are_unbiased_behind_posts() -> None:
+    bias, error = relative_bias(gradients.path_traced, 1, images=7000)
+    assert abs(bias) < 4 * error
+    assert error < 0.01
+
+
+@pytest.mark.claims("GPT-A01", "GPT-F02", part="to 2%")
+def test_differences_after_restir_are_unbiased_behind_posts_that_pan_by_fractions() -> None:
+    bias, error = relative_bias(gradients.after_restir, 3)
+    assert abs(bias) < 4 * error
+    assert error < 0.02
+
+
+class Dimmer(PathIntegrals):
+    """A mistake: J is too small by a tenth, to the right."""
+
+    def shift(self, x, index, to):
+        y = super().shift(x, index, to)
+        return Shifted(y.x, np.where(to.index % self.n > index % self.n, 0.9, 1.0) * y.J)
+
+
+@pytest.mark.parametrize(("method", "frames"), [(gradients.after_restir, 3), (gradients.path_traced, 1)])
+def test_a_jacobian_too_small_to_the_right_makes_differences_wrong(monkeypatch, method, frames) -> None:
+    monkeypatch.setattr(gradients, "PathIntegrals", Dimmer)
+    bias, error = relative_bias(method, frames)
+    assert abs(bias) > 8 * error
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_samples_of_one_pixel_and_halves_where_shifts_fail_make_differences_wrong(name) -> None:
+    bias, error = relative_bias(METHODS[name], 1)
+    assert abs(bias) > 8 * error
 
 
 def test_crops_of_maps_are_inside_of_their_rooms() -> None:
