@@ -325,7 +325,7 @@ def mark(axis: "Axes", a: Arrays, scene: str) -> None:
         axis.plot(*place, marker="o", markevery=1, ms=9, mfc="none", mec=colour, mew=width)
 
 
-TICKS, DECADES, WIDE = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20), (0.001, 0.01, 0.1, 1, 10, 100, 1000), 40.0
+TICKS, FEWER, WIDE = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20), (0.001, 0.01, 0.1, 0.3, 1, 3, 10, 30, 100), 40.0
 """Ratios that an axis names, those of one whose ends are further apart than by a factor, and the factor."""
 
 
@@ -343,10 +343,8 @@ def bars(axis: "Axes", a: Arrays, scene: str) -> None:
     axis.set_yticks(range(len(ROWS)), list(ROWS.values()))
     low, high = min(ends) / 1.3, max(ends) * 1.3
     axis.set(xscale="log", xlim=(low, high), ylim=(len(ROWS) - 0.4, -0.6), title=f"{scene}, dx and dy")
-    ticks = [tick for tick in TICKS if low <= tick <= high]
-    axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axis.minorticks_off()
-    named = [each for each in (DECADES if high > WIDE * low else TICKS) if low < each < high]
+    named = [each for each in (FEWER if high > WIDE * low else TICKS) if low < each < high]
     axis.set_xticks(named, [f"{each:g}" for each in named])
     axis.set(xlabel="variance of pair reuse, over others'")
     axis.grid(axis="y", visible=False)
@@ -368,9 +366,6 @@ def pairs(a: Arrays, camera: str, scene: str) -> list[Pair]:
         return rest_pairs(a, view)
     return [(each.ours, each.theirs) for each in of_differences(a, view)]
 
-
-TICKS = (0.1, 0.3, 1, 3, 10, 30)
-"""Ratios that are written below the bars."""
 
 FIGURE = Figure(
     id="GPT-F07-REST-3D",
