@@ -243,7 +243,7 @@ def draw(a: Arrays) -> "Picture":
         right.set_xticks([0, 1], [EDGE, INTERIOR])
         right.set(xlabel="pairs", ylabel=f"variance ({unit})", title=f"{scene}: means, {len(dx)} replicas")
         right.grid(axis="x", visible=False)
-        right.legend()
+    style.below(axes[-1, 1], ncols=3)
     return picture
 
 
