@@ -2,8 +2,8 @@
 
 The gradient paper says "error" and names no metric.  The squared error is carried by what is bright or rare, the
 relative one, e^2 / (R^2 + (.01 mean R)^2), counts dark pixels as much as bright ones, and they can say the opposite.
-So a claim about images is judged by each for itself: it holds that holds by both, fails that fails by both, and where
-they differ nothing is judged, whichever says what.
+So a claim about images holds that holds by both, and fails that fails by both; where they differ nothing is judged,
+whichever says what.  Of several scenes each is met, or contrary, that is so by both, and undecided otherwise.
 Differences of pixels have the variance alone: a difference may be zero, and nothing is relative to that.
 """
 
@@ -124,6 +124,14 @@ def answer(scenes: Sorted, least: int) -> bool | None:
     return False if len(scenes[MET]) + len(scenes[UNDECIDED]) < least else None
 
 
+def agreed(by_metric: Sequence[Sorted]) -> Sorted:
+    """Scenes that are met, and contrary, by every metric; the others are undecided."""
+    first = by_metric[0]
+    same = {kind: [x for x in first[kind] if all(x in each[kind] for each in by_metric)] for kind in (MET, CONTRARY)}
+    others = [x for names in first.values() for x in names if not any(x in names for names in same.values())]
+    return {**same, UNDECIDED: others}
+
+
 def in_words(by: Standings) -> str:
     """Which scenes stand how, metric by metric; without a name where there is one nameless measure alone."""
     return ". ".join(f"{metric}: {words(sorted_by(each))}".removeprefix(": ") for metric, each in by.items())
@@ -132,16 +140,16 @@ def in_words(by: Standings) -> str:
 def in_enough(
     id_: str, compared: Mapping[str, Mapping[str, Pair]], asked: tuple[float, int], part: str, why: str
 ) -> Claim:
-    """Below the limit in at least so many scenes by every metric, asked = (limit, how many); else not judged.
+    """Below the limit by every metric in at least so many scenes, asked = (limit, how many); else not judged.
 
-    It fails where by every metric too many scenes are contrary.  What is compared goes by scene and metric.
+    It fails where too many scenes are contrary by every metric.  What is compared goes by scene and metric.
     """
     limit, least = asked
     if short := next(filter(None, map(too_few, compared.values())), ""):
         return Claim(id_, None, part, reason=short)
     by = {metric: {scene: standing([(each[metric], limit)]) for scene, each in compared.items()} for metric in METRICS}
     rule = f"ratio < {limit:g} at 95% in at least {least} of {len(compared)}, by {both(by)}"
-    passed = unanimous([answer(sorted_by(each), least) for each in by.values()])
+    passed = answer(agreed([sorted_by(each) for each in by.values()]), least)
     return verdict(id_, part, criteria.Outcome(in_words(by), rule, passed), why)
 
 

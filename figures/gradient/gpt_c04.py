@@ -105,13 +105,13 @@ def check(a: Arrays) -> list[Claim]:
 
 
 def by_octave(a: Arrays) -> list[Claim]:
-    """The order of octaves where gradients are clean enough for it, else GPT-P03 at the measured spectra."""
+    """The order of octaves, judged where gradients are clean enough for it, and GPT-P03 at the measured spectra."""
     id_, truth, (before, after) = "GPT-C07", a["reference"], powers(a)
     s_g = ((a["dx"] - np.diff(truth)) ** 2).mean() / ((a["primal"] - truth) ** 2).mean()
     order = float(spearmanr(np.arange(len(before)), after / before).statistic)
     number, both = farthest(beside_the_formula(a))
     parts = "order of noise ratios by octave", "power after / by GPT-P03, the octave farthest off"
-    by = f"s_g / s_c = {s_g:.3f}: judged by {parts[0 if s_g < CLEAN else 1]}."
+    by = f"s_g / s_c = {s_g:.3f}: {'' if s_g < CLEAN else 'not '}clean enough to judge by this order."
     first = criteria.below(order, -0.8) if s_g < CLEAN else criteria.reported(order)
     second = placed(id_, criteria.ratio_interval(*both), inside(*CLOSE), parts[1])
     if s_g < CLEAN:

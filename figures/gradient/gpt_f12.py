@@ -160,12 +160,12 @@ def predicted(a: Arrays) -> tuple[Array, Array, Array, Array]:
 
 
 def repaired(a: Arrays) -> list[Claim]:
-    """Which frequencies of ReSTIR's image the differences repair: by the sentence's limits or by GPT-P03's spectrum."""
+    """Which frequencies of ReSTIR's image the differences repair, and what GPT-P03 expects at the measured spectra."""
     id_, s_g = "GPT-P06", noise_ratio(a)
     before, after = powers(a[f"{ROW_VIEW}.with.primal"]), powers(rebuilt_row(a, l2))
     found = predicted(a)
-    by = "the limits of its sentence" if s_g < LITTLE else "GPT-P03 at the measured spectra"
-    claims = [Claim(id_, criteria.reported(f"{s_g:.3g}: judged by {by}"), "noise of differences over that of pixels")]
+    by = "judged by its sentence" if s_g < LITTLE else "outside of its sentence, held against GPT-P03"
+    claims = [Claim(id_, criteria.reported(f"{s_g:.3g}: {by}"), "noise of differences over that of pixels")]
     for k, (band, window) in enumerate(BANDS.items()):
         own, formula = (after[k], before[k]), (found[k], found[2 + k])
         parts = f"power after / before, {band} alpha", f"power after / by GPT-P03, {band} alpha"
@@ -179,7 +179,7 @@ BANDS: Mapping[str, Window] = MappingProxyType({"below": inside(0.8, 1.2), "abov
 """What the sentence says of power after reconstruction over power before."""
 
 LITTLE = 0.15
-"""s_g / s_c up to which the sentence's own limits decide; beyond it, GPT-P03 at the measured spectra, to 10%."""
+"""s_g / s_c up to which the sentence's own limits decide; beyond it nothing does."""
 
 
 def judged(id_: str, part: str, why_not: str, outcome: Callable[[], criteria.Outcome]) -> Claim:
