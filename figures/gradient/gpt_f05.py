@@ -220,7 +220,7 @@ def draw(a: Arrays) -> "Picture":
     )
     right.set_xticks([0, 1], ["dx", "image"])
     right.set_yscale("log")
-    right.set(xlabel="what is estimated", ylabel="relMSE", title=f"Whole row, {len(dx)} replicas")
+    right.set(xlabel="what is estimated", ylabel="variance over mean square", title=f"Whole row, {len(dx)} replicas")
     right.grid(axis="x", visible=False)
     style.below(right)
     return picture
